@@ -1,0 +1,1 @@
+"""Places on the earth: frames, transforms, geodesy and placement. Imports nothing of the other packages."""

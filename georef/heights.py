@@ -1,0 +1,158 @@
+"""Altitudes above the sea to heights above the ellipsoid: h = H + N.
+
+H is the altitude in its datum, N the geoid's height above the WGS 84 ellipsoid from a grid, h what globes need.
+N is read by PROJ's `vgridshift` from one grid file named by its full path. Asking pyproj for a transformation
+between two reference systems instead would, where the grid is missing, return H unchanged with only a warning.
+https://proj.org/en/stable/operations/transformations/vgridshift.html
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from georef.errors import PlacementError
+from georef.placement import check_lonlat
+
+if TYPE_CHECKING:
+    from pyproj import Transformer
+
+OPTION = "--altitude-datum"
+
+EGM96_GRIDS = ("us_nga_egm96_15.tif", "egm96_15.gtx")
+"""File names of the 15' EGM96 grid: https://cdn.proj.org and its older form."""
+
+GRID_SUFFIXES = (".gtx", ".tif", ".tiff")
+
+MAX_UNDULATION_M = 200.0
+"""No geoid or levelling datum is further from the ellipsoid (EGM96: -107 m to 86 m); a terrain model soon is."""
+
+
+def _data_folders() -> list[Path]:
+    from pyproj import datadir
+
+    # The folders of the environment come last: they are often those of another PROJ, but a grid is a grid.
+    joined = os.pathsep.join(
+        [
+            datadir.get_data_dir(),
+            datadir.get_user_data_dir(),
+            os.environ.get("PROJ_DATA", ""),
+            os.environ.get("PROJ_LIB", ""),
+        ]
+    )
+    return [Path(folder) for folder in dict.fromkeys(joined.split(os.pathsep)) if folder]
+
+
+def _egm96_grid() -> Path:
+    for folder in _data_folders():
+        for name in EGM96_GRIDS:
+            if (folder / name).is_file():
+                return folder / name
+    raise PlacementError(
+        f"{OPTION} egm96",
+        f"the EGM96 grid {EGM96_GRIDS[0]} (or {EGM96_GRIDS[1]}) is not in PROJ's data folders",
+        f"pass the grid file itself, {OPTION} GRIDFILE, or fetch it with: projsync --file {EGM96_GRIDS[0]}",
+    )
+
+
+def grid_path(datum: str | Path) -> Path | None:
+    """The grid file that a height datum names; None for "ellipsoid", which needs none.
+
+    datum : "ellipsoid" or "egm96" in any case, or the path of a .gtx or .tif grid
+
+    Raises PlacementError where the grid is missing or the file is of another kind.
+    """
+    word = str(datum).strip()
+    if word.lower() == "ellipsoid":
+        return None
+    if word.lower() == "egm96":
+        return _egm96_grid().resolve()
+    path = Path(datum)
+    if not path.is_file():
+        raise PlacementError(
+            f"{OPTION} {datum}", "no such file", "give ellipsoid, egm96 or the path of a .gtx or .tif geoid grid"
+        )
+    if path.suffix.lower() not in GRID_SUFFIXES:
+        raise PlacementError(
+            f"{OPTION} {datum}", f"its suffix is {path.suffix!r}", "give a geoid grid as .gtx or GeoTIFF (.tif)"
+        )
+    # Resolved, because PROJ reads a leading @ as "skip me silently if I am missing" and looks relative names up
+    # in its own folders first.
+    path = path.resolve()
+    if any(character in str(path) for character in ',"'):
+        raise PlacementError(
+            f"{OPTION} {datum}", "PROJ cannot read paths with a comma or a quotation mark", "rename or move the file"
+        )
+    return path
+
+
+@functools.cache
+def _shift(path: Path, modified_ns: int) -> Transformer:
+    from pyproj import Transformer
+
+    # The modification time is only a part of the cache's key: a rewritten grid must not be answered from memory.
+    return Transformer.from_pipeline(
+        "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad "
+        f'+step +proj=vgridshift +grids="{path}" +multiplier=1 '
+        "+step +proj=unitconvert +xy_in=rad +xy_out=deg"
+    )
+
+
+def undulation_m(lon_deg: float, lat_deg: float, datum: str | Path) -> float:
+    """N, the height of a datum's zero surface above the WGS 84 ellipsoid.
+
+    lon_deg, lat_deg : GEODETIC, degrees
+    datum : as for `grid_path`
+    returns : metres, bilinear between the grid's nodes; 0 for "ellipsoid"
+
+    Raises PlacementError where the grid is missing or unreadable, has no value there, or holds something that
+    cannot be a geoid.
+    """
+    check_lonlat(lon_deg, lat_deg)
+    path = grid_path(datum)
+    if path is None:
+        return 0.0
+    from pyproj.exceptions import ProjError
+
+    try:
+        shift = _shift(path, path.stat().st_mtime_ns)
+    except ProjError as error:
+        raise PlacementError(
+            f"{OPTION} {datum}", "PROJ cannot read this as a geoid grid", "give a geoid grid as .gtx or GeoTIFF (.tif)"
+        ) from error
+    try:
+        undulation = float(shift.transform(lon_deg, lat_deg, 0.0, errcheck=True)[2])
+    except ProjError:
+        undulation = math.nan
+    if not math.isfinite(undulation):
+        raise PlacementError(
+            f"{OPTION} {datum}",
+            f"the grid has no value at longitude {lon_deg:.10g}, latitude {lat_deg:.10g}",
+            "use a grid that covers the place, or give the altitude above the ellipsoid",
+        )
+    if abs(undulation) > MAX_UNDULATION_M:
+        raise PlacementError(
+            f"{OPTION} {datum}",
+            f"its value {undulation:.6g} m at the place is no height of a geoid above the ellipsoid",
+            "give a geoid grid, not a terrain model",
+        )
+    return undulation
+
+
+def ellipsoidal_height(lon_deg: float, lat_deg: float, altitude_m: float, datum: str | Path = "ellipsoid") -> float:
+    """h, the height above the WGS 84 ellipsoid, of an altitude H in a height datum: h = H + N.
+
+    lon_deg, lat_deg : GEODETIC, degrees
+    altitude_m : H, metres above the datum's zero surface
+    datum : "ellipsoid" (h = H), "egm96", or the path of a geoid grid (.gtx or .tif)
+    returns : metres
+
+    Raises PlacementError as `undulation_m` does, and for an altitude that is not finite. An altitude is never
+    passed through unconverted.
+    """
+    if not math.isfinite(altitude_m):
+        raise PlacementError("--altitude", f"{altitude_m} is not a finite number", "give metres")
+    return altitude_m + undulation_m(lon_deg, lat_deg, datum)

@@ -1,0 +1,52 @@
+"""Where a figure stands and which way it looks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from georef.bearing import normalized_bearing
+from georef.errors import PlacementError
+
+
+def check_lonlat(lon_deg: float, lat_deg: float, source: str = "--lonlat") -> None:
+    """Raise PlacementError unless both are finite, longitude in [-180, 180] and latitude in [-90, 90] degrees.
+
+    source : where the numbers come from, for the error message
+    """
+    if not (math.isfinite(lon_deg) and math.isfinite(lat_deg)):
+        raise PlacementError(source, f"not a finite number in {(lon_deg, lat_deg)}", "give finite numbers")
+    if abs(lat_deg) > 90:
+        swapped = abs(lon_deg) <= 90 and abs(lat_deg) <= 180
+        remedy = "give longitude first, then latitude" if swapped else "latitudes lie in -90..90"
+        raise PlacementError(source, f"latitude {lat_deg:.15g} is outside -90..90", remedy)
+    if abs(lon_deg) > 180:
+        raise PlacementError(source, f"longitude {lon_deg:.15g} is outside -180..180", "longitudes lie in -180..180")
+
+
+@dataclass(frozen=True)
+class GeoPlacement:
+    """A figure's place on the WGS 84 ellipsoid.
+
+    lon_deg, lat_deg : GEODETIC, degrees; longitude in [-180, 180], latitude in [-90, 90]
+    height_m : height of the feet above the ellipsoid, metres
+    height_datum : what the height was given in before conversion: "ellipsoid", "egm96" or a grid's file name
+    heading_deg : compass bearing the nose points to, degrees clockwise from north, in [0, 360)
+    figure_height_m : height of the drawn figure, metres
+    """
+
+    lon_deg: float
+    lat_deg: float
+    height_m: float = 0.0
+    height_datum: str = "ellipsoid"
+    heading_deg: float = 180.0
+    figure_height_m: float = 1.79
+
+    def __post_init__(self) -> None:
+        values = (self.lon_deg, self.lat_deg, self.height_m, self.heading_deg, self.figure_height_m)
+        if not all(math.isfinite(value) for value in values):
+            raise PlacementError("placement", f"not a finite number in {values}", "give finite numbers")
+        check_lonlat(self.lon_deg, self.lat_deg)
+        if self.figure_height_m <= 0:
+            raise PlacementError("--height-m", f"{self.figure_height_m:g} m", "give a positive height in metres")
+        object.__setattr__(self, "heading_deg", normalized_bearing(self.heading_deg))
