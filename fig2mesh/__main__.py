@@ -1,0 +1,6 @@
+"""`python -m fig2mesh`."""
+
+from fig2mesh.cli import main
+
+if __name__ == "__main__":
+    raise SystemExit(main())

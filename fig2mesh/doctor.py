@@ -1,0 +1,44 @@
+"""Is everything there that the pipeline needs?"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.metadata
+from collections.abc import Iterator
+
+SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 libopengl0 libusb-1.0-0"
+
+PACKAGES = {
+    "numpy": "numpy", "scipy": "scipy", "numba": "numba", "torch": "torch", "open3d": "open3d-cpu",
+    "pymeshlab": "pymeshlab", "fast_simplification": "fast-simplification", "xatlas": "xatlas", "trimesh": "trimesh",
+    "pxr": "usd-core", "pyproj": "pyproj", "pygltflib": "pygltflib", "skimage": "scikit-image",
+}  # fmt: skip
+
+
+def examine() -> Iterator[tuple[str, bool, str]]:
+    """Yield (name, whether it works, version or reason) for every library."""
+    for module, distribution in PACKAGES.items():
+        try:
+            importlib.import_module(module)
+        except Exception as error:
+            reason = " ".join(str(error).split())
+            remedy = f"; run: {SYSTEM_LIBRARIES}" if "lib" in reason and ".so" in reason else ""
+            yield distribution, False, f"{reason[:200]}{remedy}"
+            continue
+        yield distribution, True, version(distribution)
+    import pymeshlab
+
+    # Without libOpenGL the import succeeds and the filters are silently missing.
+    usable = hasattr(pymeshlab.MeshSet(), "meshing_close_holes")
+    yield "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
+    import torch
+
+    yield "GPU", True, torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none (not needed)"
+
+
+def version(distribution: str) -> str:
+    """Version of an installed distribution, "" where it is not installed."""
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return ""

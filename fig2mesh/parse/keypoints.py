@@ -1,0 +1,79 @@
+"""The 21 joints from a JSON file: `{"width", "height", "keypoints": {name: [x, y, visible]}}`."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fig2mesh.errors import FigureError
+from fig2mesh.records import JOINT_NAMES, BoolArray, FloatArray
+
+MAX_BYTES = 4 << 20
+"""Larger files are no joint files; reading them whole would only cost memory."""
+
+
+def read_keypoints(path: Path) -> tuple[FloatArray, BoolArray, tuple[int, int] | None]:
+    """Read joints.
+
+    Returns
+    -------
+    joints_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
+    visible : (21,) bool
+    size : (width, height) of the picture they were drawn on, or None where the file does not say
+
+    Raises
+    ------
+    FigureError : the file cannot be read, or a joint is missing, misnamed or not a pair of finite numbers
+    """
+    content = _load(path)
+    joints = content.get("keypoints") if isinstance(content, dict) else None
+    if not isinstance(joints, dict):
+        raise FigureError(path, 'no "keypoints" object', 'expected {"keypoints": {"head": [x, y, visible], ...}}')
+    missing = [name for name in JOINT_NAMES if name not in joints]
+    unknown = [str(name) for name in joints if name not in JOINT_NAMES]
+    if missing:
+        found = f"joints missing: {_listed(missing)}"
+        if unknown:
+            found += f" (unknown names: {_listed(unknown)})"
+        raise FigureError(path, found, f"name all 21 joints: {', '.join(JOINT_NAMES)}")
+    if unknown:
+        raise FigureError(path, f"unknown joints: {_listed(unknown)}", f"use only: {', '.join(JOINT_NAMES)}")
+    points = np.empty((len(JOINT_NAMES), 2), np.float32)
+    visible = np.empty(len(JOINT_NAMES), np.bool_)
+    for index, name in enumerate(JOINT_NAMES):
+        value = joints[name]
+        if not isinstance(value, list) or len(value) not in (2, 3) or not all(_is_number(v) for v in value):
+            raise FigureError(path, f"{name} is {json.dumps(value)[:60]}", "give [x, y, visible] with finite numbers")
+        points[index] = value[:2]
+        visible[index] = len(value) == 2 or value[2] > 0
+    width, height = content.get("width"), content.get("height")
+    if isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0:
+        return points, visible, (width, height)
+    return points, visible, None
+
+
+def _load(path: Path) -> Any:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise FigureError(path, f"larger than {MAX_BYTES >> 20} MiB", "give a joints file, see --keypoints")
+        return json.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise FigureError(path, error.strerror or "cannot be read", "check --keypoints") from None
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, FigureError):
+            raise
+        reason = "nested too deeply" if isinstance(error, RecursionError) else f"not JSON ({str(error)[:80]})"
+        raise FigureError(path, reason, "give a JSON file with the 21 joints") from None
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and abs(value) < 1e9 and math.isfinite(value)
+
+
+def _listed(names: list[str], most: int = 6) -> str:
+    shown = ", ".join(name[:30] for name in names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

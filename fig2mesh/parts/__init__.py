@@ -1,0 +1,1 @@
+"""Silhouette and joints → part fields → one body."""

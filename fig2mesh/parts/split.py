@@ -1,0 +1,332 @@
+"""Split a silhouette into layers and body parts by the skeleton.
+
+The body is drawn as layers: a core (torso, head, and every limb that lies free of them) and the limbs that touch or
+cross something else. Each layer has a complete outline of its own: the torso goes on behind the arm in front of it,
+so that inflating it does not leave a trench where the arm is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.limbs import LIMBS, STOUT, Limb, complete, make_limb, measure, stoutness
+from fig2mesh.records import JOINT, PART, BoolArray
+
+LAYERED_SHARE = 0.22
+"""Limbs with a larger share of their length against something else become layers of their own."""
+
+HEAD_RADIUS_MIN = 0.05
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One outline to inflate.
+
+    name : "core" or a limb's name
+    region : (H, W) bool, completed outline, within the silhouette
+    labels : (H, W) uint8, part label of every pixel of the region
+    limb : the chain, None for the core
+    """
+
+    name: str
+    region: NDArray[np.bool_]
+    labels: NDArray[np.uint8]
+    limb: Limb | None
+
+
+@dataclass(frozen=True)
+class Split:
+    """The layers of a figure, back ones first where it matters, and all its limbs (also those in the core).
+
+    garment : (H, W) bool, pixels of the core that hang around the legs
+    labels : (H, W) uint8, the part that the drawing shows at each pixel
+    """
+
+    layers: tuple[Layer, ...]
+    limbs: tuple[Limb, ...]
+    garment: NDArray[np.bool_]
+    labels: NDArray[np.uint8]
+
+
+def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Split:
+    """Split a silhouette.
+
+    Parameters
+    ----------
+    joints : (21, 3) float64, FIGURE
+    visible : (21,) bool
+    """
+    points = canvas.points()
+    inside = canvas.inside
+    torso = _polygon_distance(points, joints[[JOINT[n] for n in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")], :2])
+    head = _segment_distance(points, joints[JOINT["neck"], :2], joints[JOINT["head"], :2])
+    limbs = _measured_limbs(canvas, joints, visible, np.minimum(torso, head), points)
+
+    garment = np.zeros(inside.shape, bool)
+    covered = {}
+    for limb, other in zip(limbs, _twins(limbs), strict=True):
+        covered[limb.name] = np.zeros(len(limb.points), bool) if limb.is_arm else _under_cloth(limb, other, visible)
+    bare = [_keep(limb, ~covered[limb.name]) for limb in limbs]
+    layered = [limb for limb in bare if limb is not None and _contact(limb) > LAYERED_SHARE]
+    merged = [limb for limb in bare if limb is not None and not any(limb is x for x in layered)]
+
+    # Who owns each pixel of the silhouette: the core or one of the layered limbs.
+    core_excess = np.minimum(torso, head - _head_radius(canvas, joints))
+    core_excess = np.minimum(core_excess, _thorax_distance(points, joints))
+    for limb in merged:
+        core_excess = np.minimum(core_excess, limb.excess(points)[0])
+    uncovered = np.minimum.reduce([torso, *(limb.excess(points)[0] for limb in bare if limb is not None)])
+    for limb in limbs:
+        hidden = _keep(limb, covered[limb.name])
+        if hidden is not None and covered[limb.name].any():
+            cloth = hidden.excess(points)[0]
+            core_excess = np.minimum(core_excess, cloth)
+            garment |= inside & (cloth < uncovered)
+    owner = _owners(canvas, core_excess, layered, points)
+
+    layers = []
+    completed = owner == 0
+    for index, limb in enumerate(layered, start=1):
+        excess, nearest = limb.excess(points)
+        region = inside & ((owner == index) | (excess < 0))
+        region = _with_chain(region, excess)
+        layers.append(Layer(limb.name, region, np.where(region, limb.part_of(nearest), np.uint8(0)), limb))
+        # Behind a limb the core goes on: inside the torso, around the root joint, and where it is on both sides.
+        root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
+        behind = _closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
+        completed |= inside & region & ((torso < 0) | root | behind)
+    core_labels = _core_labels(points, torso, head, merged, garment)
+    core = Layer("core", completed, np.where(completed, core_labels, np.uint8(0)), None)
+
+    labels = np.where(completed, core.labels, 0).astype(np.uint8)
+    for index, layer in enumerate(layers, start=1):
+        labels = np.where(owner == index, layer.labels, labels)
+    return Split((core, *layers), tuple(limb for limb in bare if limb is not None), garment & (owner == 0), labels)
+
+
+def _measured_limbs(
+    canvas: Canvas,
+    joints: NDArray[np.float64],
+    visible: BoolArray,
+    body: NDArray[np.float64],
+    points: NDArray[np.float64],
+) -> list[Limb]:
+    limbs = [make_limb(name, joints, visible) for name in LIMBS]
+    bones = [_chain_distance(limb, points) for limb in limbs]
+    measured = []
+    for index, limb in enumerate(limbs):
+        rivals = np.minimum.reduce([np.maximum(body, 0.0), *(b for i, b in enumerate(bones) if i != index)])
+        measured.append(measure(limb, canvas, rivals))
+    stout = stoutness(measured)
+    return [complete(limb, twin, stout, canvas.pitch) for limb, twin in zip(measured, _twins(measured), strict=True)]
+
+
+def _twins(limbs: list[Limb]) -> list[Limb]:
+    by_name = {limb.name: limb for limb in limbs}
+    return [by_name[("r" if limb.name[0] == "l" else "l") + limb.name[1:]] for limb in limbs]
+
+
+def _keep(limb: Limb, chosen: NDArray[np.bool_]) -> Limb | None:
+    """The limb reduced to some of its circles; None where fewer than two are left."""
+    if chosen.all():
+        return limb
+    if chosen.sum() < 2:
+        return None
+    arrays = {
+        name: getattr(limb, name)[chosen]
+        for name in ("points", "depth", "radius", "usual", "part", "ends", "free", "width", "seen")
+    }
+    return Limb(limb.name, **arrays)
+
+
+def _contact(limb: Limb) -> float:
+    """Share of a limb's length, the root left out, that lies against or over something else."""
+    beyond_root = limb.along > 1.4 * limb.radius[0] + 0.03
+    if not beyond_root.any():
+        return 0.0
+    return float(1.0 - limb.free[beyond_root].all(axis=1).mean())
+
+
+def _under_cloth(limb: Limb, twin: Limb, visible: BoolArray) -> NDArray[np.bool_]:
+    """Which circles of a leg hang under a skirt, robe or gown.
+
+    Cloth fills the space between the legs. A leg that hangs down is covered where its inner side has no contour of its
+    own and either its outer side is far wider than a leg, or the drawing hides the knee although no other leg is in
+    front of it; from there upwards to the hip, and downwards until the legs part or the outline narrows to the hem.
+    """
+    side = limb.name[0]
+    none = np.zeros(len(limb.points), bool)
+    knee, ankle = len(limb.points) * 2 // 5, len(limb.points) * 4 // 5
+    drop = limb.points[0] - limb.points[knee]
+    if drop[1] < abs(drop[0]):
+        return none
+    normal = np.gradient(limb.points, axis=0)[:, ::-1] * [-1.0, 1.0]
+    towards = np.sum(normal * (twin.points - limb.points), axis=1)
+    # Column 0 is the side of +normal.
+    inner = np.where(towards > 0, 0, 1)
+    rows = np.arange(len(inner))
+    open_inside = limb.ends[rows, inner]
+    outer = limb.width[rows, 1 - inner]
+    covered = ~open_inside & (outer > STOUT * limb.usual)
+    crossing = (twin.excess(limb.points)[0] < 0)[max(0, knee - 4) : knee + 4].any()
+    if not visible[JOINT[f"{side}_knee"]] and not crossing:
+        covered[: knee + 1] |= ~open_inside[: knee + 1]
+        if covered[knee]:
+            reference = limb.width[max(0, knee - 3) : knee].sum(axis=1).mean()
+            bare = open_inside[knee:] | (limb.width[knee:].sum(axis=1) < 0.72 * reference)
+            if not visible[JOINT[f"{side}_ankle"]]:
+                bare[:] = False
+            end = int(np.argmax(bare)) if bare.any() else len(bare)
+            covered[knee : knee + end] = True
+    if not covered.any():
+        return none
+    # The hem: the lowest circle down to which most of the leg is covered.
+    share = np.cumsum(covered) / (rows + 1.0)
+    deep = np.flatnonzero(covered & (share > 0.6))
+    if not len(deep) or deep[-1] < knee // 2:
+        return none
+    hem = int(deep[-1]) + 1
+    return rows < (len(rows) if hem > ankle else hem)
+
+
+def _owners(
+    canvas: Canvas, core_excess: NDArray[np.float64], layered: list[Limb], points: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """(H, W) 0 core, 1.. layered limbs, -1 outside: the layer that the drawing shows at each pixel."""
+    inside = canvas.inside
+    owner = np.full(inside.shape, -2)
+    costs = [core_excess]
+    for index, limb in enumerate(layered, start=1):
+        excess, nearest = limb.excess(points)
+        mine = inside & (excess < 0.25 * limb.radius[nearest])
+        # A hidden limb lies behind: the drawing shows the core there.
+        shown = limb.seen[nearest] | (core_excess > 0)
+        better = np.ones(inside.shape, bool)
+        for rival in range(1, index):
+            better &= (owner != rival) | (excess < costs[rival])
+        owner[mine & shown & better] = index
+        costs.append(excess)
+    owner[inside & (owner == -2) & (core_excess < 0)] = 0
+    owner[~inside] = -1
+    given = canvas.labels
+    for label in np.unique(given[inside]):
+        index = next((i for i, limb in enumerate(layered, start=1) if label in limb.part), 0)
+        if label:
+            owner[inside & (given == label)] = index
+    _give_leftovers(owner, np.stack(costs))
+    _rejoin_islands(owner, layered, np.stack(costs))
+    return owner
+
+
+def _give_leftovers(owner: NDArray[np.int64], costs: NDArray[np.float64]) -> None:
+    """Pixels nobody claimed (cloth, hair, bags) go, piece by piece, to the layer with which they share most border."""
+    pieces, _ = ndimage.label(owner == -2)
+    for index, window in enumerate(ndimage.find_objects(pieces), start=1):
+        grown = tuple(slice(max(0, s.start - 1), s.stop + 1) for s in window)
+        piece = pieces[grown] == index
+        border = ndimage.binary_dilation(piece) & ~piece & (owner[grown] >= 0)
+        neighbours = np.bincount(owner[grown][border], minlength=len(costs)) if border.any() else np.zeros(len(costs))
+        if neighbours.sum():
+            choice = int(np.argmax(neighbours))
+            # A large piece that also touches the core is cloth or hair of the body, not of the limb in front of it.
+            if piece.sum() > 0.5 * (owner == choice).sum() and neighbours[0] > 0.05 * neighbours.sum():
+                choice = 0
+        else:
+            choice = int(np.argmin(costs[(slice(None), *grown)][:, piece].mean(axis=1)))
+        owner[grown][piece] = choice
+
+
+def _rejoin_islands(owner: NDArray[np.int64], layered: list[Limb], costs: NDArray[np.float64]) -> None:
+    """Pixels cut off from their own layer would float at its depth: they go to the layer around them."""
+    for index in range(len(costs)):
+        pieces, count = ndimage.label(owner == index, np.ones((3, 3)))
+        if count < 2:
+            continue
+        sizes = np.bincount(pieces.ravel())[1:]
+        for piece in np.argsort(sizes)[:-1] + 1:
+            here = pieces == piece
+            border = ndimage.binary_dilation(here, np.ones((3, 3))) & ~here & (owner >= 0) & (owner != index)
+            if border.any():
+                owner[here] = np.bincount(owner[border]).argmax()
+
+
+def _with_chain(region: NDArray[np.bool_], excess: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """The pieces of a limb's region that hold some of its chain."""
+    pieces, count = ndimage.label(region, np.ones((3, 3)))
+    if count < 2:
+        return region
+    held = np.unique(pieces[region & (excess < 0)])
+    return np.isin(pieces, held[held > 0])
+
+
+def _core_labels(
+    points: NDArray[np.float64],
+    torso: NDArray[np.float64],
+    head: NDArray[np.float64],
+    merged: list[Limb],
+    garment: NDArray[np.bool_],
+) -> NDArray[np.uint8]:
+    distances = [torso, head]
+    parts: list[NDArray[np.uint8]] = [np.full(torso.shape, PART["torso"]), np.full(torso.shape, PART["head"])]
+    for limb in merged:
+        excess, nearest = limb.excess(points)
+        distances.append(excess)
+        parts.append(limb.part_of(nearest))
+    nearest_part = np.argmin(np.stack(distances), axis=0)
+    labels = np.take_along_axis(np.stack(parts), nearest_part[None], axis=0)[0]
+    return np.where(garment, PART["garment"], labels).astype(np.uint8)
+
+
+def _head_radius(canvas: Canvas, joints: NDArray[np.float64]) -> float:
+    """Half width of the head: distance from its centre to the contour."""
+    depth = -float(canvas.sample(canvas.sdf, joints[None, JOINT["head"], :2])[0])
+    return max(depth, HEAD_RADIUS_MIN)
+
+
+def _thorax_distance(points: NDArray[np.float64], joints: NDArray[np.float64]) -> NDArray[np.float64]:
+    spine = _segment_distance(points, joints[JOINT["neck"], :2], joints[JOINT["pelvis"], :2])
+    shoulders = joints[[JOINT["l_shoulder"], JOINT["r_shoulder"]], :2]
+    hips = joints[[JOINT["l_hip"], JOINT["r_hip"]], :2]
+    half = 0.25 * (np.linalg.norm(shoulders[1] - shoulders[0]) + np.linalg.norm(hips[1] - hips[0]))
+    return spine - max(float(half), 0.04)
+
+
+def _chain_distance(limb: Limb, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.spatial import cKDTree
+
+    distance, _ = cKDTree(limb.points).query(points.reshape(-1, 2))
+    return np.asarray(distance).reshape(points.shape[:-1])
+
+
+def _segment_distance(
+    points: NDArray[np.float64], start: NDArray[np.float64], end: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    along = end - start
+    t = np.clip(((points - start) @ along) / max(float(along @ along), 1e-12), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(points - start - t[..., None] * along, axis=-1))
+
+
+def _polygon_distance(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed distance to a simple or self-crossing quadrilateral's even-odd interior."""
+    distance = np.full(points.shape[:-1], np.inf)
+    within = np.zeros(points.shape[:-1], bool)
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        distance = np.minimum(distance, _segment_distance(points, start, end))
+        straddles = (start[1] > points[..., 1]) != (end[1] > points[..., 1])
+        rise = end[1] - start[1]
+        if rise:
+            cross = start[0] + (points[..., 1] - start[1]) / rise * (end[0] - start[0])
+            within ^= straddles & (points[..., 0] < cross)
+    return np.where(within, -distance, distance)
+
+
+def _closing(image: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
+    """Morphological closing by a disc, by distances: its cost does not grow with the radius (pixels)."""
+    pad = int(radius) + 2
+    grown = ndimage.distance_transform_edt(~np.pad(image, pad)) <= radius
+    return np.asarray((ndimage.distance_transform_edt(grown) > radius)[pad:-pad, pad:-pad])

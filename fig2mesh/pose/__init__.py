@@ -1,0 +1,1 @@
+"""2D joints → 3D joints."""

@@ -1,0 +1,252 @@
+"""What the stages hand to each other: frozen records with read-only arrays.
+
+Every array says its frame; the frames are defined in `georef.frames`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float32]
+IntArray = NDArray[np.int32]
+ByteArray = NDArray[np.uint8]
+BoolArray = NDArray[np.bool_]
+
+JOINT_NAMES: tuple[str, ...] = (
+    "head", "eyes", "neck", "thorax", "pelvis",
+    "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_hand", "r_hand",
+    "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle", "l_foot", "r_foot",
+)  # fmt: skip
+"""The 21 joints of paper §3; left and right are the figure's own."""
+
+JOINT: dict[str, int] = {name: index for index, name in enumerate(JOINT_NAMES)}
+
+PART_NAMES: tuple[str, ...] = (
+    "none", "torso", "head",
+    "l_upper_arm", "r_upper_arm", "l_lower_arm", "r_lower_arm", "l_hand", "r_hand",
+    "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg", "l_foot", "r_foot",
+    "hair", "garment", "prop",
+)  # fmt: skip
+"""Part labels: 0 nothing, 1-14 the body parts of paper §3, 15 and above extras."""
+
+PART: dict[str, int] = {name: index for index, name in enumerate(PART_NAMES)}
+BODY_PARTS: range = range(1, 15)
+
+ANCHORS: dict[int, tuple[int, ...]] = {
+    PART[part]: tuple(JOINT[joint] for joint in joints)
+    for part, joints in {
+        "torso": ("l_shoulder", "r_shoulder", "l_hip", "r_hip"),
+        "head": ("neck", "head"),
+        **{
+            f"{side}_{part}": (f"{side}_{first}", f"{side}_{second}")
+            for side in "lr"
+            for part, first, second in (
+                ("upper_arm", "shoulder", "elbow"),
+                ("lower_arm", "elbow", "wrist"),
+                ("hand", "wrist", "hand"),
+                ("upper_leg", "hip", "knee"),
+                ("lower_leg", "knee", "ankle"),
+                ("foot", "ankle", "foot"),
+            )
+        },
+    }.items()
+}
+"""The joints a part hangs on (paper §4.2): two for each part, four for the torso."""
+
+
+def frozen_array(array: Any, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
+    """A read-only, C-ordered copy of `array`, checked against `shape` (None: any length)."""
+    result = np.array(array, dtype=dtype, order="C", copy=True)
+    matches = len(shape) == result.ndim and all(
+        want is None or want == have for want, have in zip(shape, result.shape, strict=True)
+    )
+    if not matches:
+        raise ValueError(f"{name}: shape is {result.shape}, expected {shape}")
+    result.flags.writeable = False
+    return result
+
+
+class _Checked:
+    """Mixin: freeze and check array fields in `__post_init__`."""
+
+    def _put(self, name: str, dtype: Any, shape: tuple[int | None, ...], finite: bool = True) -> None:
+        value = frozen_array(getattr(self, name), dtype, shape, name)
+        if finite and value.dtype.kind == "f" and not np.isfinite(value).all():
+            raise ValueError(f"{name}: holds NaN or infinite values")
+        object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True)
+class Figure(_Checked):
+    """One drawn figure, cut out.
+
+    name : identifier, from the file name
+    rgba : (H, W, 4) uint8, IMAGE; straight alpha; the picture as drawn
+    mask : (H, W) bool, IMAGE; the silhouette with clothing, hair and held objects
+    joints_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
+    visible : (21,) bool; False where a joint is hidden and its position a guess
+    part_labels : (H, W) uint8, IMAGE, `PART_NAMES`; all 0 where the user gave none
+    """
+
+    name: str
+    rgba: ByteArray
+    mask: BoolArray
+    joints_px: FloatArray
+    visible: BoolArray
+    part_labels: ByteArray
+
+    def __post_init__(self) -> None:
+        self._put("rgba", np.uint8, (None, None, 4))
+        height, width = self.rgba.shape[:2]
+        self._put("mask", np.bool_, (height, width))
+        self._put("joints_px", np.float32, (21, 2))
+        self._put("visible", np.bool_, (21,))
+        self._put("part_labels", np.uint8, (height, width))
+
+
+@dataclass(frozen=True)
+class Pose3D(_Checked):
+    """joints : (21, 3) float32, FIGURE."""
+
+    joints: FloatArray
+
+    def __post_init__(self) -> None:
+        self._put("joints", np.float32, (21, 3))
+
+
+@dataclass(frozen=True)
+class PartSdf(_Checked):
+    """The signed distance field of one part on a cubic grid.
+
+    part : label, `PART_NAMES`
+    grid : (n, n, n) float32 indexed [x, y, z], FIGURE units, negative inside; samples sit on the cube's faces:
+        node i of an axis lies at centre - edge/2 + edge * i/(n-1)
+    centre : (3,) float32, FIGURE
+    edge : length of the cube's edge, FIGURE units
+    observed : False where the drawing did not show the part
+    """
+
+    part: int
+    grid: FloatArray
+    centre: FloatArray
+    edge: float
+    observed: bool = True
+
+    def __post_init__(self) -> None:
+        self._put("grid", np.float32, (None, None, None))
+        if len(set(self.grid.shape)) != 1 or self.grid.shape[0] < 2:
+            raise ValueError(f"grid: shape is {self.grid.shape}, expected a cube of at least 2 nodes an edge")
+        self._put("centre", np.float32, (3,))
+        if not self.edge > 0:
+            raise ValueError(f"edge: {self.edge}, expected a positive length")
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring nodes, FIGURE units."""
+        return float(self.edge / (self.grid.shape[0] - 1))
+
+    @property
+    def origin(self) -> FloatArray:
+        """(3,) position of node (0, 0, 0), FIGURE."""
+        return (self.centre - np.float32(self.edge / 2)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Rays(_Checked):
+    """origins, directions : (N, 3) float32, FIGURE; directions have unit length."""
+
+    origins: FloatArray
+    directions: FloatArray
+
+    def __post_init__(self) -> None:
+        self._put("origins", np.float32, (None, 3))
+        self._put("directions", np.float32, (len(self.origins), 3))
+
+
+@dataclass(frozen=True)
+class Hits(_Checked):
+    """Where rays meet the surface.
+
+    depth : (N,) float32, distance along the ray, FIGURE units; infinite where nothing is hit
+    part_index : (N,) int32, index into `Body.parts` of the part hit; -1 where nothing is hit
+    points, normals : (N, 3) float32, FIGURE; zeros where nothing is hit
+    steps : (N,) int32, field evaluations spent on the ray
+    """
+
+    depth: FloatArray
+    part_index: IntArray
+    points: FloatArray
+    normals: FloatArray
+    steps: IntArray
+
+    def __post_init__(self) -> None:
+        self._put("depth", np.float32, (None,), finite=False)
+        count = len(self.depth)
+        self._put("part_index", np.int32, (count,))
+        self._put("points", np.float32, (count, 3))
+        self._put("normals", np.float32, (count, 3))
+        self._put("steps", np.int32, (count,))
+
+    @property
+    def hit(self) -> BoolArray:
+        """(N,) bool."""
+        return self.part_index >= 0
+
+
+@dataclass(frozen=True)
+class PointCloud(_Checked):
+    """points, normals : (N, 3) float32, FIGURE; part : (N,) uint8 label of the part each point lies on."""
+
+    points: FloatArray
+    normals: FloatArray
+    part: ByteArray
+
+    def __post_init__(self) -> None:
+        self._put("points", np.float32, (None, 3))
+        self._put("normals", np.float32, (len(self.points), 3))
+        self._put("part", np.uint8, (len(self.points),))
+
+
+@dataclass(frozen=True)
+class Mesh(_Checked):
+    """A triangle mesh.
+
+    vertices : (V, 3) float32, FIGURE
+    faces : (F, 3) int32, counter-clockwise seen from outside
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+
+    def __post_init__(self) -> None:
+        self._put("vertices", np.float32, (None, 3))
+        self._put("faces", np.int32, (None, 3))
+        if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= len(self.vertices)):
+            raise ValueError(f"faces: index outside the {len(self.vertices)} vertices")
+
+
+@dataclass(frozen=True)
+class UvMesh(_Checked):
+    """A mesh with a texture atlas; vertices are split along chart borders.
+
+    solid : the closed mesh that was unwrapped
+    faces : (F, 3) int32 into the split vertices, same order of triangles as `solid.faces`
+    solid_index : (V,) int32, vertex of `solid` for each split vertex
+    uv : (V, 2) float32 in [0, 1], v = 0 at image row 0
+    atlas_size : (width, height) in texels the atlas was packed for
+    """
+
+    solid: Mesh
+    faces: IntArray
+    solid_index: IntArray
+    uv: FloatArray
+    atlas_size: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        self._put("faces", np.int32, (len(self.solid.faces), 3))
+        self._put("solid_index", np.int32, (None,))
+        self._put("uv", np.float32, (len(self.solid_index), 2))

@@ -1,0 +1,53 @@
+"""What a request asks for: the quality presets and everything that changes the result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+Quality = Literal["draft", "standard", "fine"]
+Mesher = Literal["ball-pivot", "isosurface"]
+Closing = Literal["pymeshlab", "fill"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Parameters of the pipeline; lengths in FIGURE units (a figure is 1.79 high).
+
+    canvas_px : longer side of the raster on which outlines are inflated
+    voxel : spacing of the part grids
+    spacing : distance between neighbouring points of the scan
+    triangles : of the finest mesh
+    texture_size : texels along each side of the square texture; 0: no texture
+    lods : number of meshes, the finest included; each has a quarter of the triangles of the one before
+    mesher : how the surface becomes a mesh
+    closing : what closes the holes that ball pivoting leaves
+    parts : where part fields come from
+    device : "cpu" or "cuda"
+    seed : of everything random
+    """
+
+    canvas_px: int = 448
+    voxel: float = 0.0075
+    spacing: float = 0.0085
+    triangles: int = 20_000
+    texture_size: int = 1024
+    lods: int = 1
+    mesher: Mesher = "ball-pivot"
+    closing: Closing = "pymeshlab"
+    parts: Literal["outline"] = "outline"
+    device: str = "cpu"
+    seed: int = 0
+
+
+PRESETS: dict[Quality, Settings] = {
+    "draft": Settings(canvas_px=256, voxel=0.012, spacing=0.014, triangles=6_000, texture_size=512),
+    "standard": Settings(),
+    "fine": Settings(canvas_px=768, voxel=0.005, spacing=0.006, triangles=60_000, texture_size=2048),
+}
+
+
+def settings_for(quality: Quality, **changes: object) -> Settings:
+    """A preset with the given fields replaced; fields that are None keep the preset's value."""
+    given = {name: value for name, value in changes.items() if value is not None}
+    return replace(PRESETS[quality], **given)  # type: ignore[arg-type]

@@ -1,0 +1,93 @@
+"""Keep what a stage made in one file, and read it back: `--save-stages`, `--resume-from`.
+
+A stage's result is a tree of frozen records, tuples, dictionaries, arrays and plain values. Arrays go into an .npz
+archive, the tree into a JSON text beside them in the same archive; nothing is pickled, so that reading a file from
+elsewhere runs no code.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fig2mesh.errors import FigureError, OutputError
+
+
+def _classes() -> dict[str, type]:
+    from fig2mesh import records
+    from fig2mesh.mesh import bake
+    from fig2mesh.parse import frame
+    from fig2mesh.parts import canvas, limbs, outline, split
+
+    modules = (records, frame, canvas, limbs, split, outline, bake)
+    return {
+        name: value
+        for module in modules
+        for name, value in vars(module).items()
+        if isinstance(value, type) and dataclasses.is_dataclass(value)
+    }
+
+
+def save_stage(folder: Path, stage: str, value: object) -> None:
+    """Write `value` to `folder/stage.npz`, whole or not at all."""
+    arrays: dict[str, Any] = {}
+    tree = _pack(value, arrays)
+    target = folder / f"{stage}.npz"
+    partial = folder / f".{stage}.partial.npz"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), **arrays)
+        os.replace(partial, target)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        found = f"{target}: {error.strerror}"
+        raise OutputError("--save-stages", found, "choose a folder that can be written") from None
+
+
+def load_stage(folder: Path, stage: str) -> Any:
+    """Read what `save_stage` wrote."""
+    path = folder / f"{stage}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return _unpack(json.loads(str(archive["__tree__"])), archive, _classes())
+    except FileNotFoundError:
+        raise FigureError(path, "no such file", "run once with --save-stages and without --resume-from") from None
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        found = f"not a stage file of this version ({' '.join(str(error).split())[:80]})"
+        raise FigureError(path, found, "run again with --save-stages and without --resume-from") from None
+
+
+def _pack(value: Any, arrays: dict[str, Any]) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {f.name: _pack(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
+        return {"record": type(value).__name__, "fields": fields}
+    if isinstance(value, np.ndarray):
+        name = f"a{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if isinstance(value, tuple | list):
+        return {"tuple": [_pack(item, arrays) for item in value]}
+    if isinstance(value, dict):
+        return {"dict": [[key, _pack(item, arrays)] for key, item in value.items()]}
+    if value is None or isinstance(value, bool | int | float | str):
+        return {"value": value}
+    raise TypeError(f"{type(value).__name__} cannot be kept in a stage file")
+
+
+def _unpack(tree: Any, archive: Any, classes: dict[str, type]) -> Any:
+    if "record" in tree:
+        fields = {name: _unpack(item, archive, classes) for name, item in tree["fields"].items()}
+        return classes[tree["record"]](**fields)
+    if "array" in tree:
+        return archive[tree["array"]]
+    if "tuple" in tree:
+        return tuple(_unpack(item, archive, classes) for item in tree["tuple"])
+    if "dict" in tree:
+        return {key: _unpack(item, archive, classes) for key, item in tree["dict"]}
+    return tree["value"]

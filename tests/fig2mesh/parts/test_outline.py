@@ -1,0 +1,140 @@
+"""Part fields from outlines: laws on a drawn figure whose shape is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fig2mesh.field.body import Body
+from fig2mesh.parse.frame import image_frame
+from fig2mesh.parse.read import read_figure
+from fig2mesh.parts.canvas import make_canvas
+from fig2mesh.parts.outline import Outline, outline_parts
+from fig2mesh.parts.pieces import clean
+from fig2mesh.pose.prior import lift
+from fig2mesh.records import BODY_PARTS, JOINT, JOINT_NAMES, PART_NAMES, Figure
+from tests.drawn import write_figure
+
+VOXEL = 0.012
+
+
+def read(folder: Path, scale: int = 2) -> Figure:
+    files = write_figure(folder, scale)
+    return read_figure(files.image, keypoints=files.keypoints)
+
+
+def infer(figure: Figure) -> Outline:
+    frame = image_frame(figure)
+    return outline_parts(make_canvas(figure, frame, 320), lift(figure, frame), figure.visible, voxel=VOXEL)
+
+
+@pytest.fixture(scope="module")
+def figure(tmp_path_factory: pytest.TempPathFactory) -> Figure:
+    return read(tmp_path_factory.mktemp("drawn"))
+
+
+@pytest.fixture(scope="module")
+def outline(figure: Figure) -> Outline:
+    return infer(figure)
+
+
+def front_mask(body: Body, figure: Figure, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which of every `step`-th pixel centres have the body behind them, and the drawn mask there."""
+    frame = image_frame(figure)
+    rows, columns = np.mgrid[0 : figure.mask.shape[0] : step, 0 : figure.mask.shape[1] : step]
+    xy = frame.figure_from_image(np.stack([columns + 0.5, rows + 0.5], axis=-1))
+    depth = np.linspace(-0.4, 0.4, 81)
+    shape = (*xy.shape[:2], len(depth))
+    columns_of_points = [np.broadcast_to(xy[..., None, i], shape) for i in range(2)]
+    points = np.stack([*columns_of_points, np.broadcast_to(depth, shape)], axis=-1)
+    inside = body.distance(points.reshape(-1, 3).astype(np.float32)).reshape(points.shape[:3]).min(axis=2) < 0
+    return inside, figure.mask[rows, columns]
+
+
+def test_every_part_is_there(outline: Outline) -> None:
+    assert {part.part for part in outline.parts} == set(BODY_PARTS)
+    assert all(part.observed for part in outline.parts)
+
+
+def test_front_silhouette_is_the_drawing(outline: Outline, figure: Figure) -> None:
+    body, drawn = front_mask(Body(outline.parts), figure, 3)
+    assert (body & drawn).sum() / (body | drawn).sum() > 0.97
+
+
+def test_limbs_are_as_deep_as_wide(outline: Outline, figure: Figure) -> None:
+    """A lower arm is drawn as a strip 18 px wide (of 300 px, 1.79 units): a cylinder."""
+    body = Body(outline.parts)
+    frame = image_frame(figure)
+    radius = 9 * 2 * frame.units_per_px
+    joints = lift(figure, frame).joints
+    middle = (joints[JOINT["l_elbow"]] + joints[JOINT["l_wrist"]]) / 2
+    depth = np.linspace(-0.2, 0.2, 401)
+    line = np.column_stack([np.full(401, middle[0]), np.full(401, middle[1]), depth]).astype(np.float32)
+    thick = np.ptp(depth[body.distance(line) < 0])
+    assert thick == pytest.approx(2 * radius, rel=0.12)
+
+
+def test_field_is_a_distance_near_the_surface(outline: Outline) -> None:
+    """Gradients of a signed distance have length 1; the closed form is first order, so a tenth is allowed."""
+    body = Body(outline.parts)
+    random = np.random.default_rng(0)
+    low, high = body.bounds()
+    points = random.uniform(low, high, (40_000, 3)).astype(np.float32)
+    near = points[np.abs(body.distance(points)) < 0.01]
+    length = np.linalg.norm(body.gradient(near), axis=1)
+    assert np.median(length) == pytest.approx(1.0, abs=0.05)
+    assert np.quantile(length, 0.95) < 1.3
+
+
+def test_mirrored_drawing_gives_mirrored_body(figure: Figure, outline: Outline) -> None:
+    width = figure.mask.shape[1]
+    swapped = [name.replace("l_", "R_").replace("r_", "l_").replace("R_", "r_") for name in JOINT_NAMES]
+    order = [JOINT[name] for name in swapped]
+    joints = figure.joints_px[order] * [-1, 1] + [width, 0]
+    mirrored = Figure(
+        "mirrored", figure.rgba[:, ::-1], figure.mask[:, ::-1], joints, figure.visible[order], figure.part_labels
+    )
+    body, other = Body(outline.parts), Body(infer(mirrored).parts)
+    random = np.random.default_rng(1)
+    low, high = body.bounds()
+    points = random.uniform(low, high, (4000, 3)).astype(np.float32)
+    inside = body.distance(points) < 0
+    assert (inside == (other.distance(points * np.float32([-1, 1, 1])) < 0)).mean() > 0.995
+
+
+def test_resolution_of_the_drawing_does_not_matter(tmp_path: Path, outline: Outline) -> None:
+    body, large = Body(outline.parts), Body(infer(read(tmp_path, scale=5)).parts)
+    random = np.random.default_rng(2)
+    low, high = body.bounds()
+    points = random.uniform(low, high, (4000, 3)).astype(np.float32)
+    assert ((body.distance(points) < 0) == (large.distance(points) < 0)).mean() > 0.985
+
+
+def test_hidden_forearm_goes_behind(figure: Figure) -> None:
+    """A wrist drawn over the belly lies in front of it; the same wrist marked hidden lies behind."""
+    joints = figure.joints_px.copy()
+    frame = image_frame(figure)
+    for name, x, y in (("l_wrist", 100, 140), ("l_hand", 92, 142), ("l_elbow", 130, 125)):
+        joints[JOINT[name]] = 2 * x, 2 * y
+    depths = []
+    for seen in (True, False):
+        visible = figure.visible.copy()
+        visible[[JOINT["l_wrist"], JOINT["l_hand"], JOINT["l_elbow"]]] = seen
+        posed = Figure("posed", figure.rgba, figure.mask, joints, visible, figure.part_labels)
+        hands = [part for part in infer(posed).parts if PART_NAMES[part.part] == "l_hand"]
+        depths.append(float(hands[0].centre[2]) if hands else np.nan)
+    assert depths[0] > 0.05
+    assert np.isnan(depths[1]) or depths[1] < -0.05
+    assert frame.units_per_px > 0
+
+
+def test_specks_are_dropped_and_pieces_counted(figure: Figure) -> None:
+    mask = figure.mask.copy()
+    mask[5:7, 5:7] = True
+    mask[500:560, 5:40] = True
+    dirty = Figure("dirty", figure.rgba, mask, figure.joints_px, figure.visible, figure.part_labels)
+    kept, pieces, specks = clean(dirty, image_frame(dirty), VOXEL)
+    assert (pieces, specks) == (2, 1)
+    assert not kept.mask[5:7, 5:7].any()
