@@ -1,0 +1,9 @@
+"""Errors of the writers whose cause is the user's input or disk."""
+
+from __future__ import annotations
+
+from georef.errors import InputError
+
+
+class ExportError(InputError):
+    """An output that cannot be written, or a file that cannot be read back: names it, the finding and the remedy."""

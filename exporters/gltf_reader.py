@@ -1,0 +1,213 @@
+"""glTF files back into arrays, for checking and inspecting what was written.
+
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.errors import ExportError
+from exporters.solid import merged_by_position
+
+DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+@dataclass(frozen=True)
+class Gltf:
+    """A glTF file: `document`, the JSON; `buffers`, the bytes; `path`, where it came from."""
+
+    document: dict[str, Any]
+    buffers: tuple[bytes, ...]
+    path: Path
+
+    def items(self, kind: str) -> list[dict[str, Any]]:
+        """A top-level array of the document, empty if absent."""
+        found = self.document.get(kind, [])
+        return found if isinstance(found, list) else []
+
+    def view(self, index: int) -> bytes:
+        """The bytes of a buffer view. Raises ValueError where it lies outside its buffer."""
+        view = self.items("bufferViews")[index]
+        data: bytes = self.buffers[view["buffer"]]
+        begin, length = int(view.get("byteOffset", 0)), int(view["byteLength"])
+        if begin < 0 or begin + length > len(data):
+            raise ValueError(f"bufferView {index} ends at byte {begin + length} of {len(data)}")
+        return data[begin : begin + length]
+
+    def accessor(self, index: int) -> NDArray[Any]:
+        """An accessor's values, (N,) or (N, width), sparse replacements applied. Raises ValueError out of bounds."""
+        accessor = self.items("accessors")[index]
+        dtype = np.dtype(DTYPES[accessor["componentType"]])
+        width, count = WIDTHS[accessor["type"]], accessor["count"]
+        if "bufferView" in accessor:
+            view = self.items("bufferViews")[accessor["bufferView"]]
+            values = self._strided(
+                accessor["bufferView"], accessor.get("byteOffset", 0), dtype, count, width, view.get("byteStride")
+            )
+        else:
+            values = np.zeros((count, width), dtype)
+        if "sparse" in accessor:
+            sparse = accessor["sparse"]
+            places, replacements = sparse["indices"], sparse["values"]
+            index_type = np.dtype(DTYPES[places["componentType"]])
+            rows = self._strided(
+                places["bufferView"], places.get("byteOffset", 0), index_type, sparse["count"], 1, None
+            )  # fmt: skip
+            values = values.copy()
+            values[rows[:, 0]] = self._strided(
+                replacements["bufferView"], replacements.get("byteOffset", 0), dtype, sparse["count"], width, None
+            )
+        return values[:, 0] if width == 1 else values
+
+    def _strided(
+        self, view: int, offset: int, dtype: np.dtype[Any], count: int, width: int, stride: int | None
+    ) -> NDArray[Any]:
+        data = self.view(view)
+        row = dtype.itemsize * width
+        step = stride or row
+        end = offset + step * (count - 1) + row
+        if count < 1 or offset < 0 or end > len(data):
+            raise ValueError(f"{count} elements end at byte {end} of the {len(data)} in bufferView {view}")
+        return np.ndarray((count, width), dtype, data, offset, (step, dtype.itemsize))
+
+    def image(self, index: int) -> bytes:
+        """The bytes of an image file, embedded or beside the document. Raises ValueError where there are none."""
+        item = self.items("images")[index]
+        if "bufferView" in item:
+            return self.view(item["bufferView"])
+        if "uri" not in item:
+            raise ValueError(f"image {index} has neither bufferView nor uri")
+        return _resource(self.path, item["uri"])
+
+    def mesh_arrays(self, mesh: int = 0, primitive: int = 0) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        """Positions (V, 3) float32 in the ASSET frame and triangles (F, 3) of one primitive."""
+        item = self.items("meshes")[mesh]["primitives"][primitive]
+        positions = self.accessor(item["attributes"]["POSITION"])
+        indices = self.accessor(item["indices"]) if "indices" in item else np.arange(len(positions))
+        return positions, indices.astype(np.int64).reshape(-1, 3)
+
+    def solid_arrays(self, mesh: int = 0) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Positions and triangles of a mesh with its seams undone.
+
+        By EXT_mesh_manifold where the file has it, else by merging equal positions of all primitives.
+        """
+        item = self.items("meshes")[mesh]
+        extension = item.get("extensions", {}).get("EXT_mesh_manifold")
+        if extension is not None:
+            primitive = extension["manifoldPrimitive"]
+            indices = self.accessor(primitive["indices"]).astype(np.int64)
+            return self.accessor(primitive["attributes"]["POSITION"]), indices.reshape(-1, 3)
+        parts = [self.mesh_arrays(mesh, primitive) for primitive in range(len(item["primitives"]))]
+        starts = np.cumsum([0, *(len(positions) for positions, _ in parts)])
+        positions = np.concatenate([positions for positions, _ in parts])
+        faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=False)])
+        return merged_by_position(positions, faces)
+
+    def instances(self) -> list[tuple[int, NDArray[np.float64]]]:
+        """The meshes of the default scene, each with its (4, 4) matrix scene_from_mesh."""
+        nodes, found = self.items("nodes"), []
+        scenes = self.items("scenes")
+        roots = scenes[self.document.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
+        pending = [(index, np.eye(4), 0) for index in roots]
+        while pending:
+            index, above, depth = pending.pop()
+            if depth > len(nodes):
+                raise ValueError("nodes form a cycle")
+            matrix = above @ _local_matrix(nodes[index])
+            if "mesh" in nodes[index]:
+                found.append((int(nodes[index]["mesh"]), matrix))
+            pending += [(child, matrix, depth + 1) for child in nodes[index].get("children", [])]
+        return found
+
+    def scene_vertices(self) -> NDArray[np.float64]:
+        """All vertices (N, 3) float64 of the default scene, y-up."""
+        clouds = [np.empty((0, 3))]
+        for mesh, matrix in self.instances():
+            for primitive in range(len(self.items("meshes")[mesh]["primitives"])):
+                positions = self.mesh_arrays(mesh, primitive)[0].astype(np.float64)
+                clouds.append(positions @ matrix[:3, :3].T + matrix[:3, 3])
+        return np.concatenate(clouds)
+
+
+def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+    if "matrix" in node:
+        return np.asarray(node["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= node.get("scale", (1.0, 1.0, 1.0))
+    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
+    return matrix
+
+
+def _resource(path: Path, uri: str) -> bytes:
+    if uri.startswith("data:"):
+        import base64
+
+        return base64.b64decode(uri.partition(",")[2])
+    target = path.parent / unquote(uri)
+    if not target.is_file():
+        raise ValueError(f"{uri} is not there")
+    return target.read_bytes()
+
+
+def read_gltf(path: Path | str) -> Gltf:
+    """Open a .glb or .gltf file.
+
+    Raises ExportError for files that are not there, cut off or no glTF at all; what is wrong inside a document is
+    for `exporters.validate` to say.
+    """
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+        if path.suffix.lower() == ".gltf":
+            return _with_buffers(json.loads(data), None, path)
+        text, binary = _chunks(data)
+        return _with_buffers(json.loads(text), binary, path)
+    except (OSError, ValueError, KeyError, TypeError, struct.error) as error:
+        raise ExportError(path, f"no readable glTF ({error})", "write it again") from error
+
+
+def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
+    magic, version, length = struct.unpack_from("<4sII", data)
+    if magic != b"glTF" or version != 2:
+        raise ValueError(f"starts with {magic!r} version {version}, expected b'glTF' version 2")
+    if length != len(data):
+        raise ValueError(f"header says {length} bytes, file has {len(data)}")
+    chunks: list[bytes] = []
+    place = 12
+    for kind in (b"JSON", b"BIN\0"):
+        if place == length:
+            break
+        size, found = struct.unpack_from("<I4s", data, place)
+        if found != kind or size % 4 or place + 8 + size > length:
+            raise ValueError(f"chunk at byte {place} is {found!r} of {size} bytes, expected {kind!r} within the file")
+        chunks.append(data[place + 8 : place + 8 + size])
+        place += 8 + size
+    return chunks[0], chunks[1] if len(chunks) > 1 else None
+
+
+def _with_buffers(document: dict[str, Any], binary: bytes | None, path: Path) -> Gltf:
+    if not isinstance(document, dict):
+        raise ValueError("the document is not a JSON object")
+    buffers = []
+    for index, item in enumerate(document.get("buffers", [])):
+        data = _resource(path, item["uri"]) if "uri" in item else binary
+        if data is None or len(data) < item["byteLength"]:
+            raise ValueError(f"buffer {index} has {len(data or b'')} bytes, expected {item['byteLength']}")
+        buffers.append(data)
+    return Gltf(document, tuple(buffers), path)

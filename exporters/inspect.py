@@ -1,0 +1,239 @@
+"""What is in a file: kind, size, solid, texture, place, as plain data for people and scripts."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.check_tiles import read_tileset
+from exporters.check_usd import open_stage
+from exporters.errors import ExportError
+from exporters.georeference import placement_of_tile
+from exporters.gltf_reader import Gltf, read_gltf
+from exporters.solid import measure_topology, merged_by_position
+from exporters.validate import read_triangles
+
+
+def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Facts about a file or tileset, JSON-serialisable; what a format does not say is None.
+
+    path : any kind that `exporters.validate.validate` takes
+    returns : format, files (name → bytes), name, copyright, generator, vertices, triangles, bounds_m [low, high] in
+        the frame of the file, size_m, watertight, solid, components, genus, volume_m3, texture_px [width, height],
+        parts, placement (lon_deg, lat_deg, height_m, heading_deg and what else is recorded), lods, metadata
+
+    Raises ExportError for what cannot be read.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ExportError(path, "is not there", "check the name")
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix == ".json":
+        found = _inspect_tileset(path / "tileset.json" if path.is_dir() else path)
+    elif suffix in (".glb", ".gltf"):
+        found = _inspect_gltf(path)
+    elif suffix in (".usda", ".usdc", ".usdz"):
+        found = _inspect_usd(path)
+    elif suffix in (".ply", ".obj"):
+        found = _inspect_triangles(path)
+    else:
+        raise ExportError(path, f"cannot inspect suffix {suffix or 'none'}", "see exporters.write.FORMATS")
+    keys = ("format", "files", "name", "copyright", "generator", "vertices", "triangles", "bounds_m", "size_m")
+    more = ("watertight", "solid", "components", "genus", "volume_m3", "texture_px", "parts", "placement", "lods")
+    return {key: found.get(key) for key in (*keys, *more, "metadata")}
+
+
+def _solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
+    if not len(faces):
+        return {"triangles": 0}
+    found = measure_topology(vertices, faces)
+    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
+    return {
+        "triangles": len(faces),
+        "bounds_m": [low.tolist(), high.tolist()],
+        "size_m": (high - low).tolist(),
+        "watertight": found.closed,
+        "solid": found.solid,
+        "components": found.components,
+        "genus": found.genus,
+        "volume_m3": found.volume,
+    }
+
+
+def _files(*paths: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_size for path in paths if path.is_file()}
+
+
+def _texture_size(data: bytes) -> list[int]:
+    from PIL import Image
+
+    with Image.open(io.BytesIO(data)) as image:
+        return [image.width, image.height]
+
+
+def _inspect_gltf(path: Path) -> dict[str, Any]:
+    gltf = read_gltf(path)
+    try:
+        return _gltf_facts(gltf)
+    except (ValueError, LookupError, TypeError) as error:
+        raise ExportError(path, f"broken glTF ({error})", "see validate") from error
+
+
+def _gltf_facts(gltf: Gltf) -> dict[str, Any]:
+    asset = gltf.document.get("asset", {})
+    extras = asset.get("extras", {})
+    meshes = range(len(gltf.items("meshes")))
+    solids = [gltf.solid_arrays(mesh) for mesh in meshes]
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
+    vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
+    faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
+    tables = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {}).get("propertyTables", [])
+    uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
+    beside = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+    return {
+        "format": "glTF 2.0 binary" if gltf.path.suffix.lower() == ".glb" else "glTF 2.0",
+        "files": _files(gltf.path, *beside),
+        "name": next((node["name"] for node in gltf.items("nodes") if "name" in node), None),
+        "copyright": asset.get("copyright"),
+        "generator": asset.get("generator"),
+        "vertices": sum(len(gltf.mesh_arrays(mesh)[0]) for mesh in meshes),
+        **_solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
+        "texture_px": _texture_size(gltf.image(0)) if gltf.items("images") else None,
+        "parts": _part_names(gltf, tables[0]) if tables else None,
+        "placement": extras.get("georeference"),
+        "metadata": extras.get("metadata"),
+    }
+
+
+def _part_names(gltf: Gltf, table: dict[str, Any]) -> list[str]:
+    column = table["properties"]["name"]
+    text, offsets = gltf.view(column["values"]), np.frombuffer(gltf.view(column["stringOffsets"]), "<u4")
+    return [text[begin:end].decode() for begin, end in itertools.pairwise(offsets.tolist())]
+
+
+def _inspect_tileset(path: Path) -> dict[str, Any]:
+    document = read_tileset(path)
+    lods: list[dict[str, Any]] = []
+    tile: dict[str, Any] | None = document["root"]
+    while tile is not None:
+        uri = tile.get("content", {}).get("uri")
+        if uri and uri.lower().endswith((".glb", ".gltf")):
+            lods.append({"uri": uri, "geometric_error_m": tile["geometricError"]})
+        children = tile.get("children", [])
+        tile = children[0] if len(children) == 1 else None
+    files = _files(path, *(path.parent / unquote(lod["uri"]) for lod in lods))
+    facts: dict[str, Any] = {"format": "3D Tiles " + str(document.get("asset", {}).get("version")), "files": files}
+    if not lods:
+        return facts | {"lods": [], "generator": document.get("asset", {}).get("generator")}
+    for lod in lods:
+        inside = _inspect_gltf(path.parent / unquote(lod["uri"]))
+        lod |= {key: inside[key] for key in ("vertices", "triangles", "texture_px", "solid")}
+    placement = None
+    if "transform" in document["root"]:
+        recorded = document.get("asset", {}).get("extras", {}).get("georeference", {})
+        try:
+            # What the transform does is the truth; the record beside it adds what no matrix can hold.
+            placement = recorded | placement_of_tile(document["root"]["transform"])
+        except ValueError as error:
+            raise ExportError(path, f"broken transform ({error})", "see validate") from error
+    # The chain runs from coarse to fine: `inside` is the finest.
+    return inside | facts | {"placement": placement, "lods": lods[::-1]}
+
+
+def _inspect_usd(path: Path) -> dict[str, Any]:
+    from pxr import UsdGeom, UsdShade
+
+    stage = open_stage(path)
+    facts = stage.GetRootLayer().customLayerData
+    result: dict[str, Any] = {
+        "format": {".usda": "OpenUSD text", ".usdc": "OpenUSD binary", ".usdz": "OpenUSD package"}[path.suffix.lower()],
+        "name": facts.get("name"),
+        "copyright": facts.get("copyright"),
+        "generator": facts.get("generator"),
+        "metadata": json.loads(facts["metadata"]) if "metadata" in facts else None,
+    }
+    files = [path]
+    for prim in stage.Traverse():
+        if prim.IsA(UsdGeom.Mesh) and "triangles" not in result:
+            mesh = UsdGeom.Mesh(prim)
+            points = np.array(mesh.GetPointsAttr().Get() or [], dtype=np.float64).reshape(-1, 3)
+            if any(count != 3 for count in mesh.GetFaceVertexCountsAttr().Get() or []):
+                raise ExportError(path, "holds faces that are not triangles", "triangulate it")
+            faces = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], dtype=np.int64).reshape(-1, 3)
+            if len(faces) and (faces.min() < 0 or faces.max() >= len(points)):
+                raise ExportError(path, "faces name points that are not there", "see validate")
+            result |= {"vertices": len(points), **_solid_facts(points, faces)}
+            subsets = UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, "part")
+            result["parts"] = [subset.GetPrim().GetName() for subset in subsets] or None
+        shader = UsdShade.Shader(prim)
+        if shader and shader.GetIdAttr().Get() == "UsdUVTexture":
+            from pxr import Ar
+
+            asset = shader.GetInput("file").Get()
+            if asset is not None and asset.resolvedPath:
+                opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(asset.resolvedPath))
+                result["texture_px"] = _texture_size(bytes(opened.GetBuffer()))
+                files.append(Path(asset.resolvedPath))
+    result["files"] = _files(*files)
+    result["placement"] = _usd_placement(stage.GetDefaultPrim(), dict(facts.get("georeference", {})))
+    return result
+
+
+def _usd_placement(prim: Any, recorded: dict[str, Any]) -> dict[str, Any] | None:
+    from pxr import Gf, UsdGeom
+
+    if not prim or not prim.HasAttribute("cesium:anchor:longitude"):
+        return None
+    # The stage is east, up, south; where the figure's front, +z, ends up is its heading.
+    front = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0).TransformDir(Gf.Vec3d(0, 0, 1))
+    return recorded | {
+        "lon_deg": prim.GetAttribute("cesium:anchor:longitude").Get(),
+        "lat_deg": prim.GetAttribute("cesium:anchor:latitude").Get(),
+        "height_m": prim.GetAttribute("cesium:anchor:height").Get(),
+        "heading_deg": math.degrees(math.atan2(front[0], -front[2])) % 360.0,
+    }
+
+
+def _inspect_triangles(path: Path) -> dict[str, Any]:
+    mesh = read_triangles(path)
+    vertices, faces = merged_by_position(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    image = getattr(getattr(mesh.visual, "material", None), "image", None)
+    ply = path.suffix.lower() == ".ply"
+    beside = [] if ply else [path.with_suffix(".mtl"), path.with_name(f"{path.stem}_texture.png")]
+    return {
+        "format": "Stanford PLY" if ply else "Wavefront OBJ",
+        "files": _files(path, *beside),
+        "name": path.stem,
+        "vertices": len(mesh.vertices),
+        **_solid_facts(vertices, faces),
+        "texture_px": list(image.size) if image is not None else None,
+        **_comments(path),
+    }
+
+
+def _comments(path: Path) -> dict[str, Any]:
+    """Credits and place from the comments that our PLY and OBJ writers put at the top."""
+    facts: dict[str, Any] = {}
+    place: dict[str, Any] = {}
+    with path.open("rb") as stream:
+        for raw in stream:
+            word, _, rest = raw.decode("ascii", "replace").strip().partition(" ")
+            if word not in ("ply", "format", "comment", "#"):
+                break
+            key, _, value = rest.replace(": ", " ", 1).partition(" ")
+            if key in ("copyright", "generator"):
+                facts[key] = value
+            elif key.endswith(("_deg", "_m")):
+                place[key] = float(value)
+            elif key in ("crs", "height_datum"):
+                place[key] = value
+    return facts | {"placement": place or None}

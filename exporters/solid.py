@@ -1,0 +1,130 @@
+"""The closed surface behind a mesh whose vertices are split along texture seams.
+
+Plain NumPy and one SciPy graph call, so that writers and validators can afford to measure every file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.asset import FloatArray, IntArray, TexturedMesh
+
+
+@dataclass(frozen=True)
+class Solid:
+    """The unsplit surface of a mesh.
+
+    first : (S,) int64, for each solid vertex the first mesh vertex that came from it
+    faces : (F, 3) int32 into the S solid vertices
+    vertex : (V,) int64, for each mesh vertex its solid vertex
+    """
+
+    first: NDArray[np.int64]
+    faces: IntArray
+    vertex: NDArray[np.int64]
+
+
+def solid_of(mesh: TexturedMesh) -> Solid:
+    """The solid that `mesh.solid_index` describes, its vertices numbered without gaps."""
+    _, first, vertex = np.unique(mesh.solid_index, return_index=True, return_inverse=True)
+    return Solid(first, vertex[mesh.faces].astype(np.int32), vertex)
+
+
+def merged_by_position(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDArray[Any], IntArray]:
+    """Vertices (S, 3) and faces (F, 3) int32 after merging vertices at bitwise equal positions.
+
+    vertices : (V, 3) float; faces : (F, 3) integer. For files that do not say which vertices belong together.
+    """
+    # Adding zero turns -0.0 into 0.0, which is the same place in other bits.
+    unique, inverse = np.unique(vertices + vertices.dtype.type(0), axis=0, return_inverse=True)
+    return unique, inverse.reshape(-1)[faces].astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What the edges of a triangle mesh say; all counts of zero faults mean a closed, oriented, manifold surface.
+
+    boundary_edges : edges with one triangle
+    nonmanifold_edges : edges with three triangles or more
+    misoriented_edges : edges whose two triangles run along them in the same direction
+    nonmanifold_vertices : further fans of triangles that meet an earlier fan in nothing but one vertex
+    degenerate_faces : triangles that name a vertex twice
+    components : pieces connected over edges
+    genus : number of handles, all pieces together; None unless the surface is closed, oriented and manifold
+    volume : enclosed volume in cubic units of the vertices, positive if faces are counter-clockwise from outside
+    """
+
+    boundary_edges: int
+    nonmanifold_edges: int
+    misoriented_edges: int
+    nonmanifold_vertices: int
+    degenerate_faces: int
+    components: int
+    genus: int | None
+    volume: float
+
+    @property
+    def closed(self) -> bool:
+        """No edge is open or shared by more than two triangles."""
+        return not (self.boundary_edges or self.nonmanifold_edges or self.degenerate_faces)
+
+    @property
+    def solid(self) -> bool:
+        """Closed, consistently oriented and manifold."""
+        return self.closed and not (self.misoriented_edges or self.nonmanifold_vertices)
+
+
+def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
+    """Count the faults, pieces and handles of a triangle mesh.
+
+    vertices : (V, 3) float, any frame; faces : (F, 3) integer, at least one
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    corners = np.asarray(faces, dtype=np.int64)
+    count = len(corners)
+    start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    key = low * (int(corners.max()) + 1) + high
+    order = np.argsort(key, kind="stable")
+    _, begin, uses = np.unique(key[order], return_index=True, return_counts=True)
+    pairs = begin[uses == 2]
+    one, two = order[pairs], order[pairs + 1]  # half-edges 3 * face + corner that share an edge
+    same_way = start[one] == start[two]
+
+    def pieces(size: int, left: NDArray[np.int64], right: NDArray[np.int64]) -> int:
+        links = coo_matrix((np.ones(len(left), dtype=np.int8), (left, right)), shape=(size, size))
+        return int(connected_components(links, directed=False)[0])
+
+    components = pieces(count, one // 3, two // 3)
+    # Half-edge h leaves corner h and reaches the next corner of its triangle. Joining corners that are the same
+    # vertex of neighbours leaves one group of corners per fan; a clean vertex has exactly one fan.
+    following = np.roll(np.arange(3 * count).reshape(-1, 3), -1, axis=1).reshape(-1)
+    left = np.concatenate([one, following[one]])
+    right = np.concatenate([np.where(same_way, two, following[two]), np.where(same_way, following[two], two)])
+    fans = pieces(3 * count, left, right)
+    used = len(np.unique(corners))
+
+    nonmanifold, boundary = int((uses > 2).sum()), int((uses == 1).sum())
+    degenerate = int((start == end).reshape(-1, 3).any(axis=1).sum())
+    clean = not (nonmanifold or boundary or degenerate or same_way.any() or fans != used)
+    genus = (2 * components - (used - len(uses) + count)) // 2 if clean else None
+    triangles = np.asarray(vertices, dtype=np.float64)[corners]
+    volume = float(np.einsum("ij,ij->", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0)
+    return Topology(
+        boundary, nonmanifold, int(same_way.sum()), max(fans - used, 0), degenerate, components, genus, volume
+    )
+
+
+def unit_normals(normals: FloatArray) -> FloatArray:
+    """Normals (V, 3) float32 of length 1 to rounding: file formats demand it to tighter limits than shading does."""
+    wide = normals.astype(np.float64)
+    length = np.linalg.norm(wide, axis=1, keepdims=True)
+    # A vertex of slivers only can have no direction at all; up is as good as any and keeps the file valid.
+    wide = np.where(length > 1e-12, wide / np.maximum(length, 1e-12), (0.0, 1.0, 0.0))
+    return np.asarray(wide, dtype=np.float32)

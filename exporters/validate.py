@@ -1,0 +1,88 @@
+"""Checking files that were written: the rules of their formats and our own promises about figures."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exporters.check_gltf import check_gltf
+from exporters.check_tiles import check_tileset
+from exporters.check_usd import check_usd
+from exporters.errors import ExportError
+from exporters.findings import Finding, check_solid
+from exporters.solid import merged_by_position
+
+__all__ = ["Finding", "read_triangles", "validate"]
+
+
+def validate(path: str | os.PathLike[str], external: bool = True) -> list[Finding]:
+    """Findings about a file or tileset, worst first; an empty list or nothing but infos is a clean bill.
+
+    path : .glb, .gltf, .usda, .usdc, .usdz, .ply, .obj, a tileset.json or its folder
+    external : for glTF run the Khronos validator too, if Node and the npm package gltf-validator are there
+
+    Raises ExportError for a path that is not there or of another kind.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise ExportError(path, "is not there", "check the name")
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix == ".json":
+        findings = check_tileset(path, external)
+    elif suffix in (".glb", ".gltf"):
+        findings = check_gltf(path, external)
+    elif suffix in (".usda", ".usdc", ".usdz"):
+        findings = check_usd(path)
+    elif suffix in (".ply", ".obj"):
+        findings = _check_triangles(path)
+    else:
+        raise ExportError(path, f"no check for suffix {suffix or 'none'}", "see exporters.write.FORMATS")
+    return sorted(findings, key=lambda finding: ("error", "warning", "info").index(finding.severity))
+
+
+def read_triangles(path: Path) -> Any:
+    """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
+    import trimesh
+
+    try:
+        mesh = trimesh.load_mesh(str(path), process=False)
+    except Exception as error:  # trimesh lets whatever its parsers meet through
+        raise ExportError(path, f"cannot be read ({error})", "write it again") from error
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise ExportError(path, "holds no single triangle mesh", "write it again")
+    return mesh
+
+
+def _check_triangles(path: Path) -> list[Finding]:
+    try:
+        mesh = read_triangles(path)
+    except ExportError as error:
+        return [Finding("error", "UNREADABLE", error.finding, path.name)]
+    vertices = np.asarray(mesh.vertices)
+    if not np.isfinite(vertices).all():
+        return [Finding("error", "NOT_FINITE", "vertices are NaN or infinite", path.name)]
+    findings = []
+    if path.suffix.lower() == ".obj":
+        findings = _check_references(path)
+    return findings + check_solid(*merged_by_position(vertices, np.asarray(mesh.faces)), path.name)
+
+
+def _check_references(path: Path) -> list[Finding]:
+    """Files that an OBJ and its material libraries name but that are not there."""
+    missing = []
+    pending = [(path, "mtllib")]
+    while pending:
+        file, keyword = pending.pop()
+        for line in file.read_text(errors="replace").splitlines():
+            word, _, name = line.strip().partition(" ")
+            if word != keyword:
+                continue
+            target = file.parent / name.strip()
+            if not target.is_file():
+                missing.append(Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}"))
+            elif word == "mtllib":
+                pending.append((target, "map_Kd"))
+    return missing

@@ -1,0 +1,198 @@
+"""Path to writer, and files that appear whole or not at all.
+
+A writer writes into a hidden folder beside its target; only when it has finished are its files renamed into place,
+the one that names the others last. What goes wrong before or during that leaves the disk as it was.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from exporters.asset import Asset
+from exporters.errors import ExportError
+from exporters.glb import write_glb, write_gltf
+from exporters.obj import write_obj
+from exporters.ply import write_ply
+from exporters.tiles import DEFAULT_VISIBLE_FROM_M, write_tileset
+from exporters.usd import write_usd
+
+OutputPath = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of output.
+
+    title : for people
+    writer : writes an asset to a path
+    beside : endings, after the stem, of the files written next to the one asked for
+    """
+
+    title: str
+    writer: Callable[[Asset, Path], None]
+    beside: tuple[str, ...] = ()
+
+
+TEXTURE = "_texture.png"
+"""Ending of textures beside a model; not `.png` alone, as `figure.png` is usually the drawing itself."""
+
+FORMATS: dict[str, Format] = {
+    ".glb": Format("glTF 2.0 binary", write_glb),
+    ".gltf": Format("glTF 2.0", write_gltf, (".bin", TEXTURE)),
+    ".usda": Format("OpenUSD text", write_usd, (TEXTURE,)),
+    ".usdc": Format("OpenUSD binary", write_usd, (TEXTURE,)),
+    ".usdz": Format("OpenUSD package", write_usd),
+    ".ply": Format("Stanford PLY", write_ply),
+    ".obj": Format("Wavefront OBJ", write_obj, (".mtl", TEXTURE)),
+}
+"""File formats by suffix; a folder or a tileset.json means 3D Tiles."""
+
+
+def is_tileset(path: OutputPath) -> bool:
+    """Whether a path asks for 3D Tiles: no suffix, a slash at its end, an existing folder, or named tileset.json."""
+    text, file = os.fspath(path), Path(path)
+    if text.endswith(("/", os.sep)) or file.name == "tileset.json" or not file.suffix:
+        return True
+    return file.is_dir() and file.suffix.lower() not in FORMATS  # such as maps/v1.2
+
+
+def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False) -> None:
+    """Find out before the work begins what would keep outputs from being written.
+
+    paths : all outputs of one asset
+    overwrite : existing files may be replaced
+
+    Raises ExportError naming the first output with an unknown suffix, in a folder that cannot be written to, that
+    exists although `overwrite` is off, or that is asked for twice.
+    """
+    seen: set[str] = set()
+    for path in paths:
+        main = _main_file(path)
+        _check(path, main, overwrite)
+        for companion in _companions(path):
+            if companion.exists() and not overwrite:
+                raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
+        key = os.path.abspath(main)
+        if key in seen:
+            raise ExportError(os.fspath(path), "is asked for twice", "name each output once")
+        seen.add(key)
+
+
+def write(
+    asset: Asset, path: OutputPath, overwrite: bool = False, visible_from_m: float = DEFAULT_VISIBLE_FROM_M
+) -> tuple[Path, ...]:
+    """Write an asset in the format that the path names, whole or not at all.
+
+    asset : not changed
+    path : a file with a suffix of `FORMATS`; a folder or its tileset.json for 3D Tiles. Missing folders are made
+    overwrite : replace what is there; in the folder of a tileset only files of the names we write
+    visible_from_m : for 3D Tiles, see `exporters.tiles.write_tileset`
+    returns : the files written, the one that names the others last
+
+    Raises ExportError as `check_outputs` does, and where the disk refuses.
+    """
+    main = _main_file(path)
+    _check(path, main, overwrite)
+    try:
+        with _folders(main.parent), _staging(main.parent) as stage:
+            if main.name == "tileset.json":
+                write_tileset(asset, stage, visible_from_m)
+            else:
+                FORMATS[main.suffix.lower()].writer(asset, stage / main.name)
+            names = sorted(file.name for file in stage.iterdir() if file.name != main.name) + [main.name]
+            _put_in_place(stage, main.parent, names, overwrite)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ExportError(os.fspath(path), f"cannot be written ({reason})", "choose another folder") from error
+    return tuple(main.parent / name for name in names)
+
+
+def _main_file(path: OutputPath) -> Path:
+    if is_tileset(path):
+        folder = Path(path)
+        return folder if folder.name == "tileset.json" else folder / "tileset.json"
+    file = Path(path)
+    if file.suffix.lower() not in FORMATS:
+        known = ", ".join(FORMATS)
+        raise ExportError(os.fspath(path), f"unknown suffix {file.suffix}", f"use {known} or a folder for 3D Tiles")
+    return file
+
+
+def _companions(path: OutputPath) -> list[Path]:
+    if is_tileset(path):
+        return []
+    file = Path(path)
+    return [file.with_name(file.stem + ending) for ending in FORMATS[file.suffix.lower()].beside]
+
+
+def _check(path: OutputPath, main: Path, overwrite: bool) -> None:
+    name = os.fspath(path)
+    if main.is_dir():
+        raise ExportError(name, "is a folder", "remove it or choose another name")
+    if main.exists() and not overwrite:
+        raise ExportError(main, "exists already", "use --overwrite or choose another name")
+    ancestor = next(folder for folder in Path(os.path.abspath(main)).parents if os.path.lexists(folder))
+    if not ancestor.is_dir():
+        raise ExportError(name, f"{ancestor} is not a folder", "choose another folder")
+    if not os.access(ancestor, os.W_OK | os.X_OK):
+        raise ExportError(name, f"no permission to write into {ancestor}", "choose another folder")
+
+
+@contextmanager
+def _folders(folder: Path) -> Iterator[None]:
+    """Make a folder and the ones above it; take them away again if the body fails."""
+    absolute = Path(os.path.abspath(folder))
+    missing = [each for each in (absolute, *absolute.parents) if not each.exists()]
+    try:
+        absolute.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for each in missing:
+            try:
+                each.rmdir()
+            except OSError:
+                break  # someone else has put something in: it stays
+        raise
+
+
+@contextmanager
+def _staging(folder: Path) -> Iterator[Path]:
+    # In the same folder, as only a rename within one file system is atomic. Not from tempfile: its folders are
+    # private to the user, and the files' permissions should be those that the user's umask gives.
+    stage = folder / f".fig2mesh-{os.getpid()}-{secrets.token_hex(4)}.tmp"
+    stage.mkdir()
+    try:
+        yield stage
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool) -> None:
+    """Rename staged files into their folder in this order, or leave the folder as it was."""
+    backup = stage / "replaced"
+    backup.mkdir()
+    kept, new = [], []
+    try:
+        for name in names:
+            target = folder / name
+            if target.exists():
+                if not overwrite and target.read_bytes() != (stage / name).read_bytes():
+                    # Equal bytes are no conflict: .gltf and .obj of one figure share their texture.
+                    raise ExportError(target, "exists already", "use --overwrite or choose another name")
+                shutil.copy2(target, backup / name)
+                kept.append(name)
+            else:
+                new.append(name)
+            os.replace(stage / name, target)
+    except BaseException:
+        for name in kept:
+            os.replace(backup / name, folder / name)
+        for name in new:
+            (folder / name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,20 @@
+"""Importing the exporters is cheap: what is heavy is imported by the function that needs it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import exporters
+from tests.exporters.conftest import ROOT
+
+HEAVY = ("torch", "open3d", "pxr", "trimesh", "pygltflib", "scipy", "pyproj", "PIL", "fig2mesh")
+
+
+def test_importing_every_module_imports_nothing_heavy() -> None:
+    modules = sorted(path.stem for path in Path(exporters.__path__[0]).glob("[a-z]*.py"))
+    code = "".join(f"import exporters.{module}\n" for module in modules)
+    code += f"import sys; print([name for name in {HEAVY} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.strip() == "[]"
