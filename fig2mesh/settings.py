@@ -40,8 +40,11 @@ class Settings:
     seed: int = 0
 
 
+STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "bake", "model")
+"""Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
+
 PRESETS: dict[Quality, Settings] = {
-    "draft": Settings(canvas_px=256, voxel=0.012, spacing=0.014, triangles=6_000, texture_size=512),
+    "draft": Settings(canvas_px=256, voxel=0.01, spacing=0.012, triangles=6_000, texture_size=512),
     "standard": Settings(),
     "fine": Settings(canvas_px=768, voxel=0.005, spacing=0.006, triangles=60_000, texture_size=2048),
 }

@@ -21,11 +21,11 @@ from fig2mesh.errors import FigureError, OutputError
 
 def _classes() -> dict[str, type]:
     from fig2mesh import records
-    from fig2mesh.mesh import bake
+    from fig2mesh.mesh import bake, close, solid
     from fig2mesh.parse import frame
     from fig2mesh.parts import canvas, limbs, outline, split
 
-    modules = (records, frame, canvas, limbs, split, outline, bake)
+    modules = (records, frame, canvas, limbs, split, outline, close, solid, bake)
     return {
         name: value
         for module in modules

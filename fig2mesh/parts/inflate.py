@@ -9,6 +9,8 @@ five-point Laplacian, started from the solution on a raster half as fine.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +24,23 @@ TOLERANCE = 1e-3
 
 COARSEST_PX = 24
 MOST_ITERATIONS = 400
+
+
+@contextmanager
+def single_threaded() -> Iterator[None]:
+    """PyTorch on one thread of the CPU.
+
+    The arrays of this package are small: threads would wait for each other most of the time, and several times as long
+    where another process keeps a core busy.
+    """
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def inflate(inside: NDArray[np.bool_], load: NDArray[np.float64], device: str = "cpu") -> NDArray[np.float64]:
@@ -46,7 +65,8 @@ def inflate(inside: NDArray[np.bool_], load: NDArray[np.float64], device: str = 
     window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     domain = torch.from_numpy(np.pad(inside[window], 1).astype(np.float32)).to(device)
     force = torch.from_numpy(np.pad(load[window], 1).astype(np.float32)).to(device)
-    solution = _solve(domain, force * domain)
+    with single_threaded():
+        solution = _solve(domain, force * domain)
     result[window] = solution[1:-1, 1:-1].double().cpu().numpy()
     return np.maximum(result, 0.0)
 

@@ -18,14 +18,17 @@ from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.depth import mid_surface, place_limb
-from fig2mesh.parts.inflate import inflate
+from fig2mesh.parts.inflate import inflate, single_threaded
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.split import Layer, Split, split
 from fig2mesh.records import BODY_PARTS, JOINT, PART, PART_NAMES, BoolArray, PartSdf, Pose3D
 
-LOAD = {"torso": 0.95, "head": 3.0, "garment": 1.1, "foot": 2.6, "limb": 2.0}
+LOAD = {"torso": 0.95, "head": 3.0, "garment": 1.1, "foot": 2.2, "limb": 2.0}
 """Right-hand side of the inflation by kind of part: 2 makes a strip as deep as wide, 1 about 0.7 times; a torso is
 two thirds as deep as wide, a head nearly a ball."""
+
+FRONTAL_FOOT = 4.0
+"""What a foot that points to the viewer has on top of that: it is longer than the drawing shows it wide."""
 
 OVERLAP = 0.025
 """How far neighbouring parts of one layer reach into each other, FIGURE units."""
@@ -87,7 +90,8 @@ def _surfaces(canvas: Canvas, divided: Split, joints: NDArray[np.float64], devic
     points = np.concatenate([trunk[:, :2], *(limb.points for limb in in_core)])
     depth = np.concatenate([trunk[:, 2], *(limb.depth for limb in in_core)])
     core, *others = divided.layers
-    surfaces = [_inflated(canvas, core, mid_surface(canvas, points, depth), device)]
+    loads = _loads(joints)
+    surfaces = [_inflated(canvas, core, mid_surface(canvas, points, depth), loads, device)]
     top, bottom = _extent(surfaces[0])
     legs_top, legs_bottom = np.full_like(top, np.nan), np.full_like(bottom, np.nan)
     for layer in sorted(others, key=_drawn_order):
@@ -99,7 +103,7 @@ def _surfaces(canvas: Canvas, divided: Split, joints: NDArray[np.float64], devic
             limb = place_limb(layer.limb, canvas, np.where(np.isnan(legs_top), np.nan, legs_top), legs_bottom)
             if raised.any():
                 limb = place_limb(limb, canvas, top, bottom)
-        surface = _inflated(canvas, layer, mid_surface(canvas, limb.points, limb.depth), device)
+        surface = _inflated(canvas, layer, mid_surface(canvas, limb.points, limb.depth), loads, device)
         surfaces.append(surface)
         above, below = _extent(surface)
         if not limb.is_arm:
@@ -132,10 +136,19 @@ def _lower(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64
     return np.asarray(np.fmin(a, b))
 
 
-def _inflated(canvas: Canvas, layer: Layer, z0: NDArray[np.float64], device: str) -> LayerSurface:
-    loads = np.full(len(PART_NAMES), LOAD["limb"])
-    for label, name in enumerate(PART_NAMES):
-        loads[label] = LOAD.get(name, LOAD["foot"] if name.endswith("foot") else LOAD["limb"])
+def _loads(joints: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Right-hand side of the inflation for every part label."""
+    loads = np.array([LOAD.get(name, LOAD["limb"]) for name in PART_NAMES])
+    for side in "lr":
+        across, along = np.abs(joints[JOINT[f"{side}_foot"], :2] - joints[JOINT[f"{side}_ankle"], :2])
+        sideways = across / max(0.8 * float(np.hypot(across, along)), 1e-9)
+        loads[PART[f"{side}_foot"]] = LOAD["foot"] + FRONTAL_FOOT * max(0.0, 1.0 - float(sideways))
+    return loads
+
+
+def _inflated(
+    canvas: Canvas, layer: Layer, z0: NDArray[np.float64], loads: NDArray[np.float64], device: str
+) -> LayerSurface:
     values = np.where(layer.region, loads[layer.labels], 0.0)
     blur = 0.03 / canvas.pitch
     cover = ndimage.gaussian_filter(layer.region.astype(float), blur)
@@ -186,7 +199,8 @@ def _part_field(
     edge = float((high - low).max())
     nodes = min(max(math.ceil(edge / voxel) + 1, LEAST_NODES), MOST_NODES)
     centre = (low + high) / 2.0
-    grid = _evaluate(canvas, surface, cut, centre, edge, nodes, device)
+    with single_threaded():
+        grid = _evaluate(canvas, surface, cut, centre, edge, nodes, device)
     if not (grid < 0).any():
         return None
     observed = bool((divided.labels == label).any()) if label in BODY_PARTS or label >= PART["hair"] else True

@@ -1,0 +1,254 @@
+"""The main job: read, run the pipeline, write. All side effects of the command line are here."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import resource
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from exporters.asset import Asset
+from exporters.write import check_outputs, is_tileset, write
+from fig2mesh.errors import InputError, OutputError
+from fig2mesh.parse.read import read_figure
+from fig2mesh.report import Timing, make_report
+from fig2mesh.settings import STAGES, Settings, settings_for
+from georef.bearing import parse_facing
+from georef.heights import ellipsoidal_height
+from georef.placement import GeoPlacement
+
+log = logging.getLogger("fig2mesh")
+
+
+def run(
+    *,
+    figure: Path,
+    lonlat: tuple[float, float] | None,
+    facing: str,
+    height_m: float,
+    altitude: float,
+    altitude_datum: str,
+    outputs: tuple[Path, ...],
+    mask: Path | None,
+    keypoints: Path | None,
+    part_labels: Path | None,
+    bbox: tuple[int, int, int, int] | None,
+    quality: Any,
+    triangles: int | None,
+    texture_size: int | None,
+    lods: int,
+    visible_from: float,
+    parts: str,
+    mesher: str,
+    closing: str,
+    device: str,
+    seed: int,
+    credit: str,
+    save_stages: Path | None,
+    resume_from: str | None,
+    report: Path | None,
+    overwrite: bool,
+    quiet: bool,
+    verbose: int,
+) -> None:
+    """What `fig2mesh FIGURE …` does; the parameters are the options of the command line."""
+    _configure_logging(quiet, verbose)
+    placement = _placement(lonlat, facing, height_m, altitude, altitude_datum)
+    targets = outputs or (Path(figure.stem + ".glb"),)
+    # Everything that can be refused is refused before the work begins.
+    if resume_from is not None and resume_from not in STAGES:
+        raise InputError("--resume-from", f"{resume_from} is no stage", f"choose from {', '.join(STAGES)}")
+    if resume_from is not None and save_stages is None:
+        raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
+    _check_targets(targets, placement, overwrite)
+    if report is not None:
+        _check_report(report, overwrite)
+    drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
+    settings = settings_for(
+        quality, triangles=triangles, texture_size=texture_size, lods=lods, mesher=mesher, closing=closing,
+        parts=parts, device=_device(device), seed=seed,
+    )  # fmt: skip
+
+    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.parts.pieces import clean
+
+    drawn, pieces, specks = clean(drawn, image_frame(drawn), settings.voxel)
+    if specks:
+        log.warning("%s: %d specks of the silhouette are too small to model and were left out", figure, specks)
+    results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
+    timings: list[Timing] = []
+    with _progress(quiet) as advance:
+        _run_steps(settings, height_m, results, timings, save_stages, resume_from, advance)
+        asset = Asset(
+            name=drawn.name,
+            lods=results["model"],
+            placement=placement,
+            part_names=_part_names(results["model"]),
+            copyright=credit,
+            metadata={"source": figure.name, "seed": settings.seed, "quality": quality},
+        )
+        for target in targets:
+            advance(f"write {target}")
+            start = time.perf_counter()
+            write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
+            timings.append(Timing(f"write {target.name}", time.perf_counter() - start, _peak_mb()))
+    if report is not None:
+        facts = make_report(figure, asset, results, settings, height_m)
+        facts["stages"] = [timing.as_dict() for timing in timings]
+        facts["outputs"] = [str(target) for target in targets]
+        _write_text(report, json.dumps(facts, indent=2) + "\n")
+    for target in targets:
+        log.info("%s", target)
+
+
+def _run_steps(
+    settings: Settings,
+    height_m: float,
+    results: dict[str, Any],
+    timings: list[Timing],
+    folder: Path | None,
+    resume_from: str | None,
+    advance: Any,
+) -> None:
+    from fig2mesh.pipeline import steps
+    from fig2mesh.stages import load_stage, save_stage
+
+    road = steps(settings, height_m)
+    names = [step.name for step in road]
+    first = 0
+    if resume_from is not None:
+        if resume_from not in names:
+            raise InputError(
+                "--resume-from", f"{resume_from} is not run with --mesher {settings.mesher}", "choose another"
+            )
+        first = names.index(resume_from)
+        assert folder is not None
+        if load_stage(folder, "figure") != _identity(results["figure"]):
+            raise InputError(
+                "--resume-from", "the stages were made from another figure", "pass that figure or run anew"
+            )
+    elif folder is not None:
+        save_stage(folder, "figure", _identity(results["figure"]))
+    for index, step in enumerate(road):
+        advance(step.name)
+        start = time.perf_counter()
+        if index < first and step.kept:
+            assert folder is not None
+            results[step.name] = load_stage(folder, step.name)
+            timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb(), skipped="read from stages"))
+            continue
+        results[step.name] = step.run(*(results[name] for name in step.needs))
+        timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb()))
+        log.debug("%s: %.2f s", step.name, timings[-1].seconds)
+        if folder is not None and step.kept:
+            save_stage(folder, step.name, results[step.name])
+
+
+def _identity(figure: Any) -> str:
+    """Tells figures apart: a hash of everything that the pipeline sees of one."""
+    digest = hashlib.sha256()
+    for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
+        digest.update(str(array.shape).encode() + array.tobytes())
+    return digest.hexdigest()
+
+
+def _placement(
+    lonlat: tuple[float, float] | None, facing: str, height_m: float, altitude: float, datum: str
+) -> GeoPlacement | None:
+    heading = parse_facing(facing)
+    if not 0.001 <= height_m <= 1e6:
+        raise InputError("--height-m", f"{height_m:g} m", "give a height between 1 mm and 1000 km")
+    if lonlat is None:
+        if altitude or datum != "ellipsoid":
+            raise InputError("--altitude", "given without a place", "pass --lonlat LON LAT as well")
+        return None
+    lon, lat = lonlat
+    place = GeoPlacement(lon, lat, altitude, datum, heading, height_m)
+    height = ellipsoidal_height(lon, lat, altitude, datum)
+    name = datum if datum in ("ellipsoid", "egm96") else Path(datum).name
+    return GeoPlacement(place.lon_deg, place.lat_deg, height, name, heading, height_m)
+
+
+def _check_targets(targets: tuple[Path, ...], placement: GeoPlacement | None, overwrite: bool) -> None:
+    if len({target.resolve() for target in targets}) < len(targets):
+        raise OutputError("-o", "the same output is named twice", "name each output once")
+    for target in targets:
+        if placement is None and is_tileset(target):
+            raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT")
+    check_outputs(targets, overwrite=overwrite)
+
+
+def _device(name: str) -> str:
+    import torch
+
+    if name == "cpu":
+        return "cpu"
+    available = torch.cuda.is_available()
+    if name == "cuda" and not available:
+        raise InputError("--device", "no usable CUDA device", "pass --device cpu or auto")
+    return "cuda" if available else "cpu"
+
+
+def _part_names(levels: Any) -> dict[int, str]:
+    import numpy as np
+
+    from fig2mesh.records import PART_NAMES
+
+    labels = np.unique(np.concatenate([level.parts for level in levels]))
+    return {int(label): PART_NAMES[label] for label in labels}
+
+
+def _check_report(path: Path, overwrite: bool) -> None:
+    if path.is_dir():
+        raise OutputError(path, "is a folder", "give --report a file name")
+    if path.exists() and not overwrite:
+        raise OutputError(path, "exists", "pass --overwrite or another --report")
+    if not path.parent.is_dir():
+        raise OutputError(path, f"no folder {path.parent}", "create it first")
+
+
+def _write_text(path: Path, text: str) -> None:
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise OutputError(path, error.strerror or "cannot be written", "choose another --report") from None
+
+
+def _peak_mb() -> float:
+    """Largest resident size of the process so far, MiB."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1 << 20) if sys.platform == "darwin" else peak / 1024
+
+
+def _configure_logging(quiet: bool, verbose: int) -> None:
+    level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.INFO
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    log.handlers[:] = [handler]
+    log.setLevel(level)
+    log.propagate = False
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Any]:
+    """A function that names the stage under way; a bar only on a terminal."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda name: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("start", total=None)
+        yield lambda name: bar.update(task, description=name)

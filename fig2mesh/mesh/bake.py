@@ -1,0 +1,128 @@
+"""Colours for the texture atlas (paper appendix C).
+
+Every texel is a point of the surface. Where the drawing sees that point, it takes the drawing's own pixel; elsewhere
+it takes the plain colours of its part. Seeing is decided on the mesh itself: a ray from the point towards the viewer
+must leave freely, so that an arm in front of the chest does not smear onto it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.records import ByteArray, FloatArray, UvMesh
+from fig2mesh.texture.sources import Sources
+
+GRAZING = 0.0
+"""Least z of the smooth normal of a point that the viewer may see. The smooth normal decides and not the triangle's, so
+that the border between seen and unseen runs evenly across triangles."""
+
+TURNED = -0.3
+"""Triangles turned away further than this are not seen whatever their smooth normal says."""
+
+CLEARANCE = 2e-3
+"""Rays start this far off the surface, FIGURE units, so that they do not hit the face they start from."""
+
+
+@dataclass(frozen=True)
+class Baked:
+    """color : (S, S, 3) uint8 sRGB; observed : (S, S) uint8, 255 where the drawing showed the surface, else 0;
+    covered : (S, S) bool, texels inside a chart (the others are padding)."""
+
+    color: ByteArray
+    observed: ByteArray
+    covered: NDArray[np.bool_]
+
+
+def bake(
+    mesh: UvMesh, normals: FloatArray, face_parts: ByteArray, sources: Sources, frame: ImageFrame, size: int
+) -> Baked:
+    """Bake the atlas of a mesh in FIGURE.
+
+    Parameters
+    ----------
+    normals : (V, 3) float32 unit normals at the vertices of `mesh.solid`
+    face_parts : (F,) uint8 part label of every triangle
+    size : texels along each side of the square texture
+    """
+    owner, weights = rasterise(mesh.uv, mesh.faces, size)
+    covered = owner >= 0
+    face = owner[covered]
+    corners = mesh.solid.vertices[mesh.solid.faces].astype(np.float64)
+    points = np.einsum("nk,nkd->nd", weights[covered], corners[face])
+    normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
+    seen = _seen(mesh, face, points, normal)
+    pixels = frame.image_from_figure(points)
+    color = np.empty((len(face), 3))
+    color[seen] = _bilinear(sources.seen, pixels[seen])
+    labels = face_parts[face]
+    for label in np.unique(labels[~seen]):
+        chosen = ~seen & (labels == label)
+        picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
+        color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
+    image = np.zeros((size, size, 3), np.uint8)
+    image[covered] = np.clip(np.round(color), 0, 255).astype(np.uint8)
+    observed = np.zeros((size, size), np.uint8)
+    observed[covered] = np.where(seen, 255, 0)
+    # Padding: bilinear filtering and mipmaps reach beyond the charts.
+    _, source = ndimage.distance_transform_edt(~covered, return_indices=True)
+    return Baked(image[tuple(source)], observed[tuple(source)], covered)
+
+
+def vertex_colors(mesh: UvMesh, baked: Baked) -> ByteArray:
+    """(V, 3) uint8 colour of each split vertex, for formats without textures."""
+    size = baked.color.shape[0]
+    return np.clip(np.round(_bilinear(baked.color.astype(np.float32), mesh.uv * size)), 0, 255).astype(np.uint8)
+
+
+def _seen(
+    mesh: UvMesh, face: NDArray[np.int32], points: NDArray[np.float64], smooth: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(N,) bool: points (with their smooth normals) that the viewer of the drawing, far away along +z, sees."""
+    import open3d as o3d
+
+    vertices, faces = mesh.solid.vertices, mesh.solid.faces
+    a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
+    flat = np.cross(b - a, c - a)
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)
+    seen = (smooth[:, 2] > GRAZING) & (flat[face, 2] > TURNED)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
+    start = points[seen] + CLEARANCE * flat[face[seen]]
+    rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
+    seen[seen] = ~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
+    return np.asarray(seen)
+
+
+def _bilinear(picture: NDArray[np.float32], pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) colours at (N, 2) x, y in pixels with centres at +0.5; the border is continued."""
+    x = np.clip(pixels[:, 0] - 0.5, 0, picture.shape[1] - 1)
+    y = np.clip(pixels[:, 1] - 0.5, 0, picture.shape[0] - 1)
+    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
+    x1, y1 = np.minimum(x0 + 1, picture.shape[1] - 1), np.minimum(y0 + 1, picture.shape[0] - 1)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    top = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
+    bottom = picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx
+    return np.asarray(top * (1 - fy) + bottom * fy, np.float64)
+
+
+def rasterise(
+    uv: NDArray[np.float32], faces: NDArray[np.int32], size: int
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Which triangle covers each texel centre.
+
+    Returns
+    -------
+    owner : (S, S) int32 triangle, -1 where none
+    weights : (S, S, 3) float32 barycentric coordinates
+    """
+    from fig2mesh.mesh.raster_kernel import rasterise_triangles
+
+    owner = np.full((size, size), -1, np.int32)
+    weights = np.zeros((size, size, 3), np.float32)
+    rasterise_triangles(uv.astype(np.float64) * size, faces, owner, weights)
+    return owner, weights

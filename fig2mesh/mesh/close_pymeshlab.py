@@ -1,0 +1,37 @@
+"""Close holes by PyMeshLab, the one place that uses it. PyMeshLab is GPL-3; `fill.py` does the same without it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fig2mesh.mesh.topology import as_mesh
+from fig2mesh.records import Mesh
+
+LARGEST_HOLE = 2000
+"""Edges of the largest hole to close."""
+
+
+def close_pymeshlab(mesh: Mesh) -> Mesh:
+    """Close the holes of a manifold mesh.
+
+    Holes come closed, but new faces may disagree with old ones on the outside or meet them in an edge with a third
+    face: the caller checks. PyMeshLab's own test against self-intersection is off, as it leaves one hole in three open.
+    """
+    try:
+        import pymeshlab
+    except ImportError as error:
+        raise RuntimeError(
+            f"pymeshlab: cannot be imported ({error}); install `pymeshlab` and, on Debian, "
+            "`apt-get install libgl1 libegl1 libopengl0 libusb-1.0-0`, or close by method='fill'"
+        ) from error
+    scene = pymeshlab.MeshSet(verbose=False)
+    # Without libopengl0 the import passes, the plugins are not loaded, and filters are missing without a word.
+    if not hasattr(scene, "meshing_close_holes"):
+        raise RuntimeError(
+            "pymeshlab: the filter meshing_close_holes is missing, so its plugins could not be loaded; "
+            "`apt-get install libgl1 libegl1 libopengl0 libusb-1.0-0`, or close by method='fill'"
+        )
+    scene.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))
+    scene.meshing_close_holes(maxholesize=LARGEST_HOLE, newfaceselected=False, selfintersection=False)
+    closed = scene.current_mesh()
+    return as_mesh(closed.vertex_matrix(), closed.face_matrix())

@@ -1,0 +1,84 @@
+"""A body's surface as one closed solid for each piece of the drawing, by either mesher."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fig2mesh.field.body import Body
+from fig2mesh.mesh.ball_pivot import ball_pivot
+from fig2mesh.mesh.close import CloseReport, close
+from fig2mesh.mesh.isosurface import isosurface
+from fig2mesh.mesh.topology import check_solid, component_areas, face_components, select_faces
+from fig2mesh.records import Mesh, PointCloud
+from fig2mesh.settings import Settings
+
+CRUMB = 0.01
+"""Components beyond the drawn pieces are dropped where they have less than this share of the surface."""
+
+ISOSURFACE_SPACING = 1.4
+"""Grid spacing of the isosurface relative to the scan's point spacing: about as many triangles."""
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """How the solid was made.
+
+    mesher : "ball-pivot" or "isosurface"; what made the mesh in the end
+    closing : the report of closing; None for the isosurface, which is closed from the start
+    crumbs : components dropped because they are no piece of the drawing
+    note : "" or why the mesher asked for was not the one used
+    """
+
+    mesher: str
+    closing: CloseReport | None
+    crumbs: int
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """mesh : closed, oriented, manifold, FIGURE; how : how it came about."""
+
+    mesh: Mesh
+    how: Meshing
+
+
+def make_solid(cloud: PointCloud | None, body: Body, settings: Settings, pieces: int) -> Solid:
+    """Mesh a body; `cloud` is its scan for ball pivoting, None for the isosurface.
+
+    The drawing has `pieces` pieces and so has the solid: where ball pivoting bridges a narrow gap between two of them,
+    the isosurface replaces it.
+    """
+    if cloud is None:
+        return _by_isosurface(body, settings, pieces, "")
+    closed, report = close(ball_pivot(cloud, settings.spacing), body, method=settings.closing)
+    mesh, crumbs = _without_crumbs(closed, pieces)
+    found = check_solid(mesh)
+    if found.solid and found.components == pieces:
+        mesher = "isosurface" if report.method == "isosurface" else "ball-pivot"
+        return Solid(mesh, Meshing(mesher, report, crumbs, report.fallback))
+    reason = f"ball pivoting made {found.components} components of {pieces} drawn pieces"
+    other = _by_isosurface(body, settings, pieces, reason)
+    if found.solid and check_solid(other.mesh).components != pieces:
+        return Solid(mesh, Meshing("ball-pivot", report, crumbs, reason))
+    return other
+
+
+def _by_isosurface(body: Body, settings: Settings, pieces: int, note: str) -> Solid:
+    mesh, crumbs = _without_crumbs(isosurface(body, spacing=ISOSURFACE_SPACING * settings.spacing), pieces)
+    return Solid(mesh, Meshing("isosurface", None, crumbs, note))
+
+
+def _without_crumbs(mesh: Mesh, pieces: int) -> tuple[Mesh, int]:
+    """The mesh without components that are neither among the `pieces` largest nor large enough to matter."""
+    labels = face_components(mesh.faces)
+    areas = component_areas(mesh, labels)
+    if len(areas) <= pieces:
+        return mesh, 0
+    rank = np.argsort(np.argsort(-areas))
+    kept = (rank < pieces) | (areas > CRUMB * areas.sum())
+    if kept.all():
+        return mesh, 0
+    return select_faces(mesh, kept[labels]), int((~kept).sum())

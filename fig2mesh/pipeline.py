@@ -1,0 +1,141 @@
+"""The road from a figure to a model, in the order of the paper.
+
+Pure: no files, no clock, no terminal. `steps` lists the verbs; each takes the results of earlier ones by name, so that
+a caller can time them, keep what they make and start in the middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from exporters.asset import Texture, TexturedMesh
+from fig2mesh.field.body import Body
+from fig2mesh.mesh.bake import Baked, bake, vertex_colors
+from fig2mesh.mesh.normals import vertex_normals
+from fig2mesh.mesh.scan import scan
+from fig2mesh.mesh.simplify import deviation, simplify
+from fig2mesh.mesh.solid import Solid, make_solid
+from fig2mesh.mesh.unwrap import unwrap
+from fig2mesh.parse.frame import image_frame
+from fig2mesh.parts.canvas import make_canvas
+from fig2mesh.parts.outline import Outline, outline_parts
+from fig2mesh.placing import asset_from_figure
+from fig2mesh.pose.prior import lift
+from fig2mesh.records import ByteArray, Figure, Mesh, PointCloud, Pose3D, UvMesh
+from fig2mesh.settings import Settings
+from fig2mesh.texture.sources import make_sources
+
+
+@dataclass(frozen=True)
+class Step:
+    """One verb of the pipeline.
+
+    name : of the verb and of its result
+    needs : names of the results it takes, in order
+    run : the verb
+    kept : whether its result is worth a file; the others are made anew in no time
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    run: Callable[..., Any]
+    kept: bool = True
+
+
+def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
+    """The verbs that a request needs, in order. The first takes the result "figure", the last makes "model"."""
+
+    def lift_pose(figure: Figure) -> Pose3D:
+        return lift(figure, image_frame(figure))
+
+    def infer_parts(figure: Figure, pose: Pose3D) -> Outline:
+        canvas = make_canvas(figure, image_frame(figure), settings.canvas_px)
+        return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device)
+
+    def assemble(outline: Outline) -> Body:
+        return Body(outline.parts)
+
+    def scan_body(body: Body) -> PointCloud:
+        return scan(body, spacing=settings.spacing, seed=settings.seed)
+
+    def mesh_cloud(cloud: PointCloud, body: Body, pieces: int) -> Solid:
+        return make_solid(cloud, body, settings, pieces)
+
+    def mesh_field(body: Body, pieces: int) -> Solid:
+        return make_solid(None, body, settings, pieces)
+
+    def simplify_levels(solid: Solid) -> tuple[Mesh, ...]:
+        return tuple(simplify(solid.mesh, max(settings.triangles // 4**level, 200)) for level in range(settings.lods))
+
+    def unwrap_levels(levels: tuple[Mesh, ...]) -> tuple[UvMesh, ...]:
+        return tuple(
+            unwrap(mesh, texture_size=max(settings.texture_size >> level, 128)) for level, mesh in enumerate(levels)
+        )
+
+    def bake_levels(figure: Figure, outline: Outline, body: Body, unwrapped: tuple[UvMesh, ...]) -> tuple[Baked, ...]:
+        frame = image_frame(figure)
+        sources = make_sources(figure, frame, outline, settings.texture_size, settings.seed)
+        return tuple(
+            bake(
+                mesh,
+                vertex_normals(mesh.solid, body),
+                _face_parts(mesh.solid, body),
+                sources,
+                frame,
+                max(settings.texture_size >> level, 128),
+            )
+            for level, mesh in enumerate(unwrapped)
+        )
+
+    def finish(
+        pose: Pose3D, body: Body, solid: Solid, unwrapped: tuple[UvMesh, ...], baked: tuple[Baked, ...]
+    ) -> tuple[TexturedMesh, ...]:
+        asset = asset_from_figure(pose, unwrapped[0].solid.vertices, height_m)
+        scale = float(asset.matrix[0, 0])
+        levels = []
+        for mesh, texture in zip(unwrapped, baked, strict=True):
+            mean, worst = deviation(mesh.solid, solid.mesh)
+            levels.append(
+                TexturedMesh(
+                    vertices=asset.apply(mesh.solid.vertices).astype(np.float32)[mesh.solid_index],
+                    faces=mesh.faces,
+                    normals=vertex_normals(mesh.solid, body)[mesh.solid_index],
+                    solid_index=mesh.solid_index,
+                    uv=mesh.uv,
+                    texture=Texture(texture.color),
+                    observed=Texture(texture.observed[..., None]),
+                    colors=vertex_colors(mesh, texture),
+                    parts=_labels(body, mesh.solid.vertices)[mesh.solid_index],
+                    deviation_m=(mean * scale, worst * scale),
+                )
+            )
+        return tuple(levels)
+
+    meshing = (
+        (Step("cloud", ("body",), scan_body), Step("solid", ("cloud", "body", "pieces"), mesh_cloud))
+        if settings.mesher == "ball-pivot"
+        else (Step("solid", ("body", "pieces"), mesh_field),)
+    )
+    return (
+        Step("lift", ("figure",), lift_pose),
+        Step("parts", ("figure", "lift"), infer_parts),
+        Step("body", ("parts",), assemble, kept=False),
+        *meshing,
+        Step("simplify", ("solid",), simplify_levels),
+        Step("unwrap", ("simplify",), unwrap_levels),
+        Step("bake", ("figure", "parts", "body", "unwrap"), bake_levels),
+        Step("model", ("lift", "body", "solid", "unwrap", "bake"), finish, kept=False),
+    )
+
+
+def _labels(body: Body, points: np.ndarray) -> ByteArray:
+    """(N,) uint8 part label nearest to each point."""
+    return np.array([part.part for part in body.parts], np.uint8)[body.nearest_part(points)]
+
+
+def _face_parts(mesh: Mesh, body: Body) -> ByteArray:
+    return _labels(body, mesh.vertices[mesh.faces].mean(axis=1).astype(np.float32))

@@ -1,0 +1,84 @@
+"""`--report`: what was made, how long it took, and how good it is by measures taken on the result itself."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exporters.asset import Asset
+from fig2mesh import __version__
+from fig2mesh.doctor import PACKAGES, version
+from fig2mesh.measure import front_similarity, shape_measures, silhouette_iou
+from fig2mesh.parse.frame import image_frame
+from fig2mesh.placing import asset_from_figure
+from fig2mesh.settings import Settings
+
+
+@dataclass(frozen=True)
+class Timing:
+    """seconds of wall clock for one stage; peak_mb: largest resident size of the process until its end, MiB."""
+
+    name: str
+    seconds: float
+    peak_mb: float
+    skipped: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "stage": self.name,
+            "seconds": round(self.seconds, 4),
+            "peak_mb": round(self.peak_mb, 1),
+            "run": not self.skipped,
+            "why": self.skipped or "needed for the outputs",
+        }
+
+
+def make_report(
+    source: Path, asset: Asset, results: dict[str, Any], settings: Settings, height_m: float
+) -> dict[str, Any]:
+    """Everything but the timings.
+
+    The silhouette and the front view are measured on the finest textured mesh as it goes to the exporters, rendered
+    orthographically at the drawing's resolution.
+    """
+    figure = results["figure"]
+    frame = image_frame(figure)
+    transform = asset_from_figure(results["lift"], results["unwrap"][0].solid.vertices, height_m)
+    # The pixel under the ASSET origin: FIGURE (0, 0) is the pelvis, at frame.origin_px.
+    origin = frame.image_from_figure(transform.inverse().apply(np.zeros((1, 3))))[0]
+    pixel = frame.units_per_px * float(transform.matrix[0, 0])
+    origin_px = float(origin[0]), float(origin[1])
+    front = front_similarity(asset.mesh, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    iou = silhouette_iou(asset.mesh, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    covered = [baked.observed[baked.covered] for baked in results["bake"][:1]]
+    return {
+        "fig2mesh": __version__,
+        "figure": {"file": source.name, "sha256": _sha256(source), "pieces": results["pieces"]},
+        "settings": asdict(settings),
+        "placement": asdict(asset.placement) if asset.placement else None,
+        "measures": {
+            **shape_measures(asset.mesh),
+            "pieces_drawn": results["pieces"],
+            "silhouette_iou": iou,
+            "front_psnr_db": front.psnr_db,
+            "front_ssim": front.ssim,
+            "texels_observed": float(np.mean(covered[0] > 0)),
+        },
+        "lods": [
+            {"triangles": len(m.faces), "mean_deviation_m": m.deviation_m[0], "max_deviation_m": m.deviation_m[1]}
+            for m in asset.lods
+        ],
+        "meshing": asdict(results["solid"].how),
+        "versions": {name: version(name) for name in PACKAGES.values()},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

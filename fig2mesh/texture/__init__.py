@@ -1,0 +1,1 @@
+"""Colours for the seen and the unseen side of a figure."""

@@ -1,0 +1,223 @@
+"""Pictures from which the surface takes its colours: the drawing itself, and a plain version of it for unseen sides.
+
+The plain version keeps the drawing's flat colours and loses what a draughtsman would not repeat at the back: contours,
+buttons, eyes. It is a mode filter over a small palette: at every pixel the colour that dominates its neighbourhood.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy import ndimage
+from scipy.cluster.vq import kmeans2
+
+from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.parts.outline import Outline
+from fig2mesh.records import JOINT, PART, Figure
+
+COLOURS = 12
+"""Palette size; flat drawings have fewer, shaded ones lose little."""
+
+WINDOW = 0.022
+"""Radius of the mode filter, FIGURE units: wider than a contour, narrower than a limb."""
+
+LINE_WIDTH = 0.014
+"""Colours that only occur in strokes thinner than about twice this are ink, FIGURE units."""
+
+PLAIN_SHARE = 0.625
+"""Longest side of the plain pictures relative to the texture's: what the texture could show of them."""
+
+FACE_SHARE = 1.05
+"""Half width of the face relative to the head's."""
+
+DARK = 0.3
+"""Relative luminance below which a colour may be ink."""
+
+INK = 0.2
+"""Palette colours of less weight are strokes, not hair."""
+
+LEAST_HAIR = 0.04
+"""Share of the head that hair or hat must have to be carried on over its back."""
+
+HAIRLINE = 0.55
+"""Height of the hairline above the eyes relative to the head's half width."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Colour pictures in IMAGE pixels of the figure.
+
+    seen : (H, W, 3) float32 sRGB 0-255; the drawing, its colours continued beyond the silhouette
+    plain : part label → (h, w, 3) float32, the colours that part has on its unseen sides
+    plain_scale : IMAGE pixels → pixels of the plain pictures
+    """
+
+    seen: NDArray[np.float32]
+    plain: dict[int, NDArray[np.float32]]
+    plain_scale: float
+
+
+def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_size: int, seed: int) -> Sources:
+    """The drawing and its plain version for each part of `outline`."""
+    seen = _continued(figure.rgba, figure.mask)
+    scale = min(1.0, PLAIN_SHARE * texture_size / max(figure.mask.shape))
+    height, width = (max(1, round(n * scale)) for n in figure.mask.shape)
+    # Both axes by the same factor, so that one number maps pixels.
+    small = np.asarray(
+        Image.fromarray(seen.astype(np.uint8)).resize((width, height), Image.Resampling.BOX), dtype=np.float32
+    )
+    rows, columns = np.mgrid[0:height, 0:width]
+    full_height, full_width = figure.mask.shape
+    centres = np.stack([(columns + 0.5) * full_width / width, (rows + 0.5) * full_height / height], axis=-1)
+    points = frame.figure_from_image(centres)
+    where = np.round(outline.canvas.pixels(points)).astype(int)
+    labels = _lookup(outline.split.labels, where)
+    palette, index = _palette(small, labels > 0, seed)
+    pitch = frame.units_per_px * figure.mask.shape[0] / height
+    ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)
+
+    plain: dict[int, NDArray[np.float32]] = {}
+    for surface in outline.layers:
+        parts = [int(part) for part in np.unique(surface.labels[surface.labels > 0])]
+        own = np.isin(labels, parts)
+        if not own.any():
+            own = labels > 0
+        picture = _dominant(index, own, palette, ink, WINDOW / pitch)
+        for part in parts:
+            plain[part] = picture
+    head = PART["head"]
+    if head in plain:
+        face, radius = _face(figure, frame, outline, points)
+        plain[head] = _without_face(plain[head], labels == head, face, index, palette, ink, 0.5 * radius / pitch)
+    return Sources(seen, plain, height / figure.mask.shape[0])
+
+
+def _continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """The picture with its inner colours carried outwards, so that no background is mixed in at the rim."""
+    solid = ndimage.binary_erosion(mask, iterations=1, border_value=1) & (rgba[..., 3] > 250)
+    if not solid.any():
+        solid = mask
+    _, source = ndimage.distance_transform_edt(~solid, return_indices=True)
+    return np.asarray(rgba[..., :3][tuple(source)], np.float32)
+
+
+def _lookup(image: NDArray[np.uint8], where: NDArray[np.int_]) -> NDArray[np.uint8]:
+    rows, columns = where[..., 0], where[..., 1]
+    valid = (rows >= 0) & (rows < image.shape[0]) & (columns >= 0) & (columns < image.shape[1])
+    return np.where(valid, image[np.clip(rows, 0, image.shape[0] - 1), np.clip(columns, 0, image.shape[1] - 1)], 0)
+
+
+def _palette(
+    picture: NDArray[np.float32], own: NDArray[np.bool_], seed: int
+) -> tuple[NDArray[np.float32], NDArray[np.int_]]:
+    """(K, 3) colours of the figure and the (h, w) index of the nearest one at every pixel."""
+    pixels = picture[own]
+    random = np.random.default_rng(seed)
+    sample = pixels[random.permutation(len(pixels))[:20_000]].astype(np.float64)
+    distinct = np.unique(np.round(sample / 8), axis=0)
+    count = min(COLOURS, len(distinct))
+    centres, _ = kmeans2(sample, count, minit="++", seed=random, iter=12)
+    centres = centres[np.isfinite(centres).all(axis=1)].astype(np.float32)
+    distance = ((picture[..., None, :] - centres) ** 2).sum(axis=-1)
+    index = np.argmin(distance, axis=-1)
+    # The mean of a cluster is a mixed colour; the median is one that the drawing has.
+    for i in range(len(centres)):
+        members = picture[own & (index == i)]
+        if len(members):
+            centres[i] = np.median(members, axis=0)
+    return centres.astype(np.float32), np.asarray(index)
+
+
+def _ink(
+    palette: NDArray[np.float32], index: NDArray[np.int_], own: NDArray[np.bool_], width: float
+) -> NDArray[np.float64]:
+    """(K,) weight of each palette colour: near 0 for dark colours that only occur as strokes, 1 for fills.
+
+    Light colours in thin pieces are patterns: dots, checks, stripes. They keep their weight.
+    """
+    weight = np.ones(len(palette))
+    luminance = palette @ np.array([0.2126, 0.7152, 0.0722]) / 255.0
+    light = np.clip((luminance - DARK) / DARK, 0.0, 1.0)
+    for i in range(len(palette)):
+        area = own & (index == i)
+        if area.any():
+            core = ndimage.distance_transform_edt(area) > max(width, 1.0)
+            if core.any():
+                fill = ndimage.distance_transform_edt(~core) <= width + 1.0
+                weight[i] = max(float((fill & area).sum() / area.sum()), 0.05) ** 2
+            else:
+                weight[i] = 0.05**2
+    return np.asarray(np.maximum(weight, light))
+
+
+def _dominant(
+    index: NDArray[np.int_],
+    own: NDArray[np.bool_],
+    palette: NDArray[np.float32],
+    weight: NDArray[np.float64],
+    radius: float,
+) -> NDArray[np.float32]:
+    """(h, w, 3) colour that dominates the neighbourhood among the pixels `own`; continued to the whole picture."""
+    best = np.zeros(index.shape)
+    chosen = np.zeros(index.shape, int)
+    for i in range(len(palette)):
+        member = (own & (index == i)).astype(np.float32)
+        if member.any():
+            votes = weight[i] * ndimage.gaussian_filter(member, radius / 1.5)
+            better = votes > best
+            best[better], chosen[better] = votes[better], i
+    reliable = own & (best > 1e-4)
+    if not reliable.any():
+        reliable = own
+    _, source = ndimage.distance_transform_edt(~reliable, return_indices=True)
+    return np.asarray(palette[chosen[tuple(source)]])
+
+
+def _without_face(
+    picture: NDArray[np.float32],
+    head: NDArray[np.bool_],
+    face: NDArray[np.bool_],
+    index: NDArray[np.int_],
+    palette: NDArray[np.float32],
+    weight: NDArray[np.float64],
+    radius: float,
+) -> NDArray[np.float32]:
+    """The plain head with the face replaced by what surrounds it (hair, hat), as long as that is not skin."""
+    face = face & head
+    around = head & ~face
+    if not face.any() or not around.any():
+        return picture
+    skin = int(np.argmax(np.bincount(index[face], minlength=len(palette)) * weight))
+    hair = around & (index != skin) & (weight[index] > INK)
+    if hair.sum() < LEAST_HAIR * head.sum():
+        hair = around
+    behind = np.where(face[..., None], _dominant(index, hair, palette, weight, radius), picture)
+    return np.asarray(ndimage.gaussian_filter(behind, (1.5, 1.5, 0)))
+
+
+def _face(
+    figure: Figure, frame: ImageFrame, outline: Outline, points: NDArray[np.float64]
+) -> tuple[NDArray[np.bool_], float]:
+    """(h, w) bool: where the drawing shows a face from the front, and the head's half width, FIGURE units.
+
+    Profiles and faceless heads have none to hide.
+    """
+    eyes, head, neck = (frame.figure_from_image(figure.joints_px[JOINT[n]]) for n in ("eyes", "head", "neck"))
+    none = np.zeros(points.shape[:-1], bool)
+    radius = -float(outline.canvas.sample(outline.canvas.sdf, head[None])[0])
+    if not figure.visible[JOINT["eyes"]] or radius <= 0:
+        return none, 0.0
+    up = head - neck
+    up = up / max(float(np.linalg.norm(up)), 1e-9)
+    aside = abs(float(np.array([up[1], -up[0]]) @ (eyes - head)))
+    if aside > 0.6 * radius:
+        return none, 0.0
+    # From the chin to a hairline half a head above the eyes; below the eyes as wide as the head.
+    offset = points - eyes
+    along, across = offset @ up, (points - head) @ np.array([up[1], -up[0]])
+    rise = np.maximum(along, 0.0) / (HAIRLINE * radius)
+    face = (rise**2 + (across / (FACE_SHARE * radius)) ** 2 < 1.0) & (along > -2.0 * radius)
+    return np.asarray(face), radius

@@ -1,0 +1,136 @@
+"""The command line: help without heavy imports, one line and exit code 2 for bad usage, nothing lost."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fig2mesh.cli import main
+from fig2mesh.settings import PRESETS, STAGES
+from tests.drawn import DrawnFiles, write_figure
+
+HEAVY = ("torch", "open3d", "numpy", "scipy", "numba", "pymeshlab", "trimesh", "pxr")
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> DrawnFiles:
+    return write_figure(tmp_path)
+
+
+def arguments(files: DrawnFiles, *more: str) -> list[str]:
+    return [str(files.image), "--keypoints", str(files.keypoints), "--quality", "draft", *more]
+
+
+def test_help_imports_nothing_heavy() -> None:
+    program = (
+        "import sys\nfrom fig2mesh.cli import main\ncode = main(['--help'])\n"
+        f"loaded = [name for name in {HEAVY!r} if name in sys.modules]\nprint(code, loaded, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "0 []"
+    for option in ("--lonlat", "--keypoints", "--quality", "--overwrite", "inspect", "validate"):
+        assert option in done.stdout
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert "fig2mesh" in capsys.readouterr().out
+
+
+BAD = {
+    "latitude": (("--lonlat", "8.5", "97.4"), "latitude"),
+    "swapped": (("--lonlat", "47.4", "188.5"), "--lonlat"),
+    "longitude": (("--lonlat", "188.5", "47.4"), "longitude"),
+    "nan": (("--lonlat", "nan", "47.4"), "finite"),
+    "one number": (("--lonlat", "8.5"), "--lonlat"),
+    "not a number": (("--lonlat", "east", "47"), "east"),
+    "facing": (("--facing", "up"), "--facing"),
+    "height": (("--height-m", "-1"), "--height-m"),
+    "zero height": (("--height-m", "0"), "--height-m"),
+    "altitude without place": (("--altitude", "400"), "--lonlat"),
+    "grid": (("--lonlat", "8", "47", "--altitude-datum", "no-such-grid.gtx"), "no-such-grid.gtx"),
+    "suffix": (("-o", "model.fbx"), "model.fbx"),
+    "tiles without place": (("-o", "tiles/tileset.json"), "--lonlat"),
+    "same output twice": (("-o", "a.glb", "-o", "./a.glb"), "twice"),
+    "quality": (("--quality", "best"), "best"),
+    "unknown option": (("--colour", "red"), "--colour"),
+    "bbox": (("--bbox", "0", "0", "5000", "10"), "--bbox"),
+    "resume nowhere": (("--resume-from", "unwrap"), "--save-stages"),
+    "resume unknown": (("--resume-from", "dance", "--save-stages", "stages"), "dance"),
+    "resume empty": (("--resume-from", "unwrap", "--save-stages", "stages"), "stages"),
+    "report folder": (("--report", "missing/report.json"), "missing"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_usage_is_one_line(
+    files: DrawnFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    options, expected = BAD[case]
+    assert main(arguments(files, *options)) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    assert expected in captured.err
+    assert captured.err.startswith("fig2mesh: ")
+    assert captured.err.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_existing_output_is_kept(files: DrawnFiles, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "kept.glb"
+    target.write_text("precious")
+    assert main(arguments(files, "-o", str(target))) == 2
+    assert target.read_text() == "precious"
+    assert "--overwrite" in capfd.readouterr().err
+
+
+def test_missing_figure_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / "nobody.png")]) == 2
+    message = capfd.readouterr().err
+    assert "nobody.png" in message
+    assert message.count("\n") == 1
+
+
+def test_bare_picture_says_what_to_pass(files: DrawnFiles, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main([str(files.image)]) == 2
+    assert "--keypoints" in capfd.readouterr().err
+
+
+def test_faults_of_ours_are_not_the_users(
+    files: DrawnFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("planted")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("fig2mesh.parts.outline.inflate", broken)
+    assert main(arguments(files)) == 1
+    message = capfd.readouterr().err
+    assert "internal error: ZeroDivisionError: planted" in message
+    assert "Traceback" not in message
+    assert not (tmp_path / "drawn.glb").exists()
+
+
+def test_inspect_refuses_what_is_not_there(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(tmp_path / "missing.glb")]) == 2
+    message = capfd.readouterr().err
+    assert "missing.glb" in message
+    assert message.count("\n") == 1
+
+
+def test_validate_finds_damage(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "broken.glb"
+    broken.write_bytes(b"glTF but not really")
+    assert main(["validate", str(broken)]) == 2
+    assert "broken.glb" in "".join(capfd.readouterr())
+
+
+def test_stage_names_of_the_help_are_the_pipelines() -> None:
+    from fig2mesh.pipeline import steps
+
+    assert [step.name for step in steps(PRESETS["draft"], 1.79)] == list(STAGES)

@@ -1,0 +1,99 @@
+"""Plain colours for unseen sides: fills stay, ink and faces go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import ImageDraw
+
+from fig2mesh.parse.frame import image_frame
+from fig2mesh.parts.canvas import make_canvas
+from fig2mesh.parts.outline import outline_parts
+from fig2mesh.pose.prior import lift
+from fig2mesh.records import JOINT, JOINT_NAMES, PART, Figure
+from fig2mesh.texture.sources import Sources, make_sources
+from tests.drawn import JOINTS, draw_figure
+
+SCALE = 2
+EYE, HAIR, INK = (20, 200, 20), (120, 60, 10), (0, 0, 0)
+
+
+def colours_of(figure: Figure) -> Sources:
+    frame = image_frame(figure)
+    canvas = make_canvas(figure, frame, 256)
+    outline = outline_parts(canvas, lift(figure, frame), figure.visible, voxel=0.03)
+    return make_sources(figure, frame, outline, texture_size=1024, seed=0)
+
+
+@pytest.fixture(scope="module")
+def figure() -> Figure:
+    """The drawn figure with hair, green eyes and black contours across shirt and trousers."""
+    image = draw_figure(SCALE)
+    pen = ImageDraw.Draw(image)
+    x, y = (SCALE * c for c in JOINTS["head"])
+    pen.chord((x - 52, y - 52, x + 52, y + 52), 185, 355, fill=HAIR)
+    for dx in (-18, 18):
+        pen.ellipse((x + dx - 9, y - 2, x + dx + 9, y + 16), fill=EYE)
+    for row in range(180, 330, 30):
+        pen.line((140, row, 260, row), fill=INK, width=4)
+    rgba = np.asarray(image)
+    joints = np.array([JOINTS[name] for name in JOINT_NAMES], np.float32) * SCALE
+    shape = rgba.shape[:2]
+    return Figure("inked", rgba, rgba[..., 3] > 127, joints, np.ones(21, bool), np.zeros(shape, np.uint8))
+
+
+@pytest.fixture(scope="module")
+def sources(figure: Figure) -> Sources:
+    return colours_of(figure)
+
+
+def near(picture: np.ndarray, colour: tuple[int, int, int], tolerance: float = 40.0) -> np.ndarray:
+    return np.linalg.norm(picture - np.array(colour), axis=-1) < tolerance
+
+
+def at(sources: Sources, part: str, joint: str) -> np.ndarray:
+    x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS[joint])
+    return sources.plain[PART[part]][y, x]
+
+
+def test_fills_stay_and_ink_goes(sources: Sources) -> None:
+    shirt = sources.plain[PART["torso"]]
+    x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS["thorax"])
+    window = shirt[y - 10 : y + 60, x - 20 : x + 20]
+    assert near(window, (200, 40, 40)).mean() > 0.99
+    assert near(window, INK).sum() == 0
+    assert near(at(sources, "l_lower_leg", "l_knee"), (40, 60, 170))
+    assert near(at(sources, "l_hand", "l_hand"), (40, 160, 60))
+
+
+def test_no_face_on_the_back_of_the_head(sources: Sources, figure: Figure) -> None:
+    head = sources.plain[PART["head"]]
+    assert near(head, EYE, 60).sum() == 0
+    x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS["head"])
+    assert near(head[y + 8, x], HAIR), "hair is carried on over the face"
+
+
+def test_faceless_heads_keep_their_colours(figure: Figure) -> None:
+    visible = figure.visible.copy()
+    visible[JOINT["eyes"]] = False
+    head = colours_of(replace(figure, visible=visible)).plain[PART["head"]]
+    x, y = (int(SCALE * c) for c in JOINTS["head"])
+    assert near(head[y + 34, x], (230, 180, 150))
+
+
+def test_background_is_not_mixed_in(figure: Figure) -> None:
+    rgba = figure.rgba.copy()
+    rgba[~figure.mask] = (255, 0, 255, 255)
+    seen = make_sources_seen(replace(figure, rgba=rgba))
+    assert near(seen, (255, 0, 255), 60).sum() == 0
+
+
+def make_sources_seen(figure: Figure) -> np.ndarray:
+    return colours_of(figure).seen
+
+
+def test_deterministic(figure: Figure, sources: Sources) -> None:
+    again = colours_of(figure)
+    assert all(np.array_equal(sources.plain[part], again.plain[part]) for part in sources.plain)
