@@ -31,7 +31,7 @@ class DrawnFiles:
 
 
 def draw_figure(scale: int = 2) -> Image.Image:
-    """An RGBA picture of the figure: skin head and hands, red shirt, blue trousers, black shoes."""
+    """An RGBA picture of the figure: red shirt, blue trousers, black shoes, a green glove on the left hand."""
     image = Image.new("RGBA", (SIZE[0] * scale, SIZE[1] * scale), (0, 0, 0, 0))
     pen = ImageDraw.Draw(image)
 
@@ -43,11 +43,12 @@ def draw_figure(scale: int = 2) -> Image.Image:
             pen.ellipse((x - r, y - r, x + r, y + r), fill=colour)
 
     skin, shirt, trousers, shoes = (230, 180, 150), (200, 40, 40), (40, 60, 170), (30, 30, 30)
+    glove = {"l": (40, 160, 60), "r": skin}
     for side in "lr":
         line((f"{side}_hip", f"{side}_knee", f"{side}_ankle"), 22, trousers)
         line((f"{side}_ankle", f"{side}_foot"), 16, shoes)
         line((f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist"), 18, shirt)
-        line((f"{side}_wrist", f"{side}_hand"), 17, skin)
+        line((f"{side}_wrist", f"{side}_hand"), 17, glove[side])
     outline = [JOINTS[name] for name in ("l_shoulder", "r_shoulder", "r_hip", "l_hip")]
     pen.polygon([(scale * x, scale * y) for x, y in outline], fill=shirt)
     line(("neck", "thorax", "pelvis"), 44, shirt)

@@ -1,0 +1,55 @@
+# Everything runs from a bare machine with Python 3.11+, a C compiler and git: each target sets up what it needs.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+SYSTEM_LIBRARIES := libgl1 libegl1 libopengl0 libusb-1.0-0
+SYSTEM_INSTALL := apt-get install -y --no-install-recommends $(SYSTEM_LIBRARIES)
+# Long tests run in continuous integration, and here with `make test SLOW=1`.
+SLOW ?= $(CI)
+
+.PHONY: help setup system demo test check bench sheet clean
+
+help:
+	@echo "make demo   convert a shipped figure: GLB, 3D Tiles, USDZ and a picture in build/demo"
+	@echo "make test   run the tests (SLOW=1: the long ones too)"
+	@echo "make check  ruff, mypy and the tests"
+	@echo "make bench  measure time and memory: build/bench.json"
+	@echo "make sheet  contact sheet of a folder of figures: FIGURES=… OUT=…"
+
+setup: system $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt uv
+	$(BIN)/python -m uv pip install --quiet --python $(BIN)/python -c constraints.txt -e ".[dev]" || \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	touch $@
+
+# Open3D and MeshLab load four libraries that a minimal Debian does not have.
+system:
+	@$(PYTHON) tests/system_libraries.py || { \
+	  if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	    echo "installing $(SYSTEM_LIBRARIES)"; apt-get update -qq && $(SYSTEM_INSTALL) >/dev/null; \
+	  else echo "system libraries are missing; run: sudo $(SYSTEM_INSTALL)" >&2; exit 1; fi; }
+
+demo: setup
+	$(BIN)/python examples/place_figure.py build/demo
+
+test: setup
+	$(BIN)/python -m pytest $(if $(SLOW),,-m "not slow")
+
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest $(if $(SLOW),,-m "not slow")
+
+bench: setup
+	$(BIN)/python -m tests.benchmarks.run build/bench.json
+
+sheet: setup
+	$(BIN)/python docs/make_contact_sheet.py $(FIGURES) $(OUT)
+
+clean:
+	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

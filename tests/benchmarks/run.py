@@ -1,0 +1,137 @@
+"""Measure time and memory on a shipped figure: `python -m tests.benchmarks.run OUT.json`.
+
+Writes `{name: {value, unit, how}}`. Machines differ and are noisy: compare ratios and medians within one run only.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FIGURE = Path(__file__).parents[2] / "examples" / "figures" / "farmer"
+TURNTABLE = tuple(range(0, 360, 30))
+
+
+def measure() -> dict[str, dict[str, Any]]:
+    """All benchmarks of this version."""
+    with tempfile.TemporaryDirectory() as folder:
+        return {**whole_figures(Path(folder)), **tracing(), **levels(Path(folder))}
+
+
+def arguments(target: Path, *more: str) -> list[str]:
+    figure = [str(FIGURE / "image.png"), "--keypoints", str(FIGURE / "keypoints.json"), "--lonlat", "8.5417", "47.3769"]
+    return [*figure, "-o", str(target), "--overwrite", "-q", *more]
+
+
+def whole_figures(folder: Path) -> dict[str, dict[str, Any]]:
+    """The main job in a fresh process, and again in one that has already made a figure."""
+    from fig2mesh.cli import main
+
+    # Peak memory comes from the report: a child's maximum as the operating system counts it starts at its parent's.
+    report = folder / "report.json"
+    command = [sys.executable, "-m", "fig2mesh", *arguments(folder / "cold.glb", "--report", str(report))]
+    cold = [_seconds(lambda: subprocess.run(command, check=True)) for _ in range(3)]
+    peak = max(stage["peak_mb"] for stage in json.loads(report.read_text())["stages"])
+
+    def warm(quality: str) -> float:
+        words = arguments(folder / f"{quality}.glb", "--quality", quality)
+        main(words)
+        return statistics.median(_seconds(lambda: main(words)) for _ in range(3))
+
+    return {
+        "figure_cold_s": _value(statistics.median(cold), "s", "fresh process, standard quality, one GLB, median of 3"),
+        "figure_warm_s": _value(warm("standard"), "s", "same process, standard quality, median of 3 after one"),
+        "figure_draft_warm_s": _value(warm("draft"), "s", "same process, draft quality, median of 3 after one"),
+        "peak_mb": _value(peak, "MiB", "largest resident size of the fresh process, standard quality"),
+    }
+
+
+def farmer_body() -> Any:
+    """The body of the shipped farmer at standard quality."""
+    from fig2mesh.field.body import Body
+    from fig2mesh.parse.read import read_figure
+    from fig2mesh.pipeline import steps
+    from fig2mesh.settings import PRESETS
+
+    results: dict[str, Any] = {"figure": read_figure(FIGURE / "image.png", keypoints=FIGURE / "keypoints.json")}
+    for step in steps(PRESETS["standard"], 1.79)[:3]:
+        results[step.name] = step.run(*(results[name] for name in step.needs))
+    body = results["body"]
+    assert isinstance(body, Body)
+    return body
+
+
+def tracing() -> dict[str, dict[str, Any]]:
+    """Frames a second of a turntable with normals, and Embree on the isosurface of the same field beside it."""
+    import open3d as o3d
+
+    from fig2mesh.field.camera import framing, orthographic
+    from fig2mesh.field.trace import trace
+    from fig2mesh.mesh.isosurface import isosurface
+
+    body = farmer_body()
+    mesh = isosurface(body, spacing=0.01)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        o3d.core.Tensor.from_numpy(np.array(mesh.vertices)), o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32))
+    )
+    found = {}
+    ratio = 0.0
+    for size in (256, 512):
+        frames = []
+        for yaw in TURNTABLE:
+            centre, height = framing(body.bounds(), (size, size), yaw)
+            frames.append(orthographic(yaw, size=(size, size), height=height, centre=centre))
+        packed = [np.concatenate([rays.origins, rays.directions], axis=1) for rays in frames]
+        trace(body, frames[0])
+        ours, theirs = [], []
+        for rays, both in zip(frames, packed, strict=True):
+            ours.append(_seconds(lambda rays=rays: trace(body, rays)))
+            theirs.append(_seconds(lambda both=both: scene.cast_rays(o3d.core.Tensor.from_numpy(both))))
+        fps = 1.0 / statistics.median(ours)
+        how = f"{size}x{size}, trilinear, normals, no texture blending, {len(TURNTABLE)} views of the farmer, median"
+        found[f"trace_fps_{size}"] = _value(fps, "1/s", how)
+        ratio = statistics.median(a / b for a, b in zip(ours, theirs, strict=True))
+    how = f"time per frame over Embree's on {len(mesh.faces)} triangles of the isosurface, 512x512, median of pairs"
+    return {**found, "embree_ratio_512": _value(ratio, "1", how)}
+
+
+def levels(folder: Path) -> dict[str, dict[str, Any]]:
+    """Mean distance of a 5,000-triangle model to the full mesh."""
+    from fig2mesh.cli import main
+
+    report = folder / "lod.json"
+    main(arguments(folder / "lod.glb", "--triangles", "5000", "--report", str(report)))
+    mean = json.loads(report.read_text())["lods"][0]["mean_deviation_m"]
+    return {"lod5k_mean_mm": _value(1000 * mean, "mm", "5,000 triangles against the full mesh, 1.79 m figure")}
+
+
+def _seconds(job: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    job()
+    return time.perf_counter() - start
+
+
+def _value(value: float, unit: str, how: str) -> dict[str, Any]:
+    return {"value": round(float(value), 4), "unit": unit, "how": how}
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "build/bench.json")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    results = measure()
+    machine = f"{platform.machine()}, Python {platform.python_version()}"
+    target.write_text(json.dumps(results, indent=2) + "\n")
+    for name, entry in results.items():
+        print(f"{name:22s} {entry['value']:>10g} {entry['unit']:4s} {entry['how']}")
+    print(f"written to {target} ({machine})")
