@@ -23,9 +23,9 @@ def _classes() -> dict[str, type]:
     from fig2mesh import records
     from fig2mesh.mesh import bake, close, solid
     from fig2mesh.parse import frame
-    from fig2mesh.parts import canvas, limbs, outline, split
+    from fig2mesh.parts import canvas, layers, limbs, outline, split
 
-    modules = (records, frame, canvas, limbs, split, outline, close, solid, bake)
+    modules = (records, frame, canvas, limbs, split, layers, outline, close, solid, bake)
     return {
         name: value
         for module in modules

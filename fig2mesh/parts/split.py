@@ -100,6 +100,8 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
         behind = _closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
         completed |= inside & region & ((torso < 0) | root | behind)
+    # Detached pieces that only a limb claimed but does not reach belong to the core, whatever is left of them.
+    completed |= inside & ~np.logical_or.reduce([completed, *(layer.region for layer in layers)])
     core_labels = _core_labels(points, torso, head, merged, garment)
     core = Layer("core", completed, np.where(completed, core_labels, np.uint8(0)), None)
 
