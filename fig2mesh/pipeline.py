@@ -53,7 +53,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         return lift(figure, image_frame(figure))
 
     def infer_parts(figure: Figure, pose: Pose3D) -> Outline:
-        canvas = make_canvas(figure, image_frame(figure), settings.canvas_px)
+        canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, 0.9 * settings.voxel)
         return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device)
 
     def assemble(outline: Outline) -> Body:

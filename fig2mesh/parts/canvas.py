@@ -10,12 +10,16 @@ from PIL import Image
 from scipy import ndimage
 
 from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.parts.hairlines import thicken
 from fig2mesh.records import Figure
 
 CONTOUR_PX = 1024
 """Longest side at which the contour is measured; finer would cost time and add pen jitter."""
 
 MARGIN_PX = 4
+
+HAIR_PX = 0.9
+"""Half the width of the thinnest stroke, pixels of the contour's raster."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,10 @@ class Canvas:
         return np.asarray(flat).reshape(rows.shape[:-1])
 
 
-def make_canvas(figure: Figure, frame: ImageFrame, height_px: int) -> Canvas:
+def make_canvas(figure: Figure, frame: ImageFrame, height_px: int, thinnest: float = 0.0) -> Canvas:
     """The silhouette of a figure, resampled so that its longer side has `height_px` pixels.
+
+    Strokes narrower than `thinnest` (FIGURE units) are drawn that wide: a grid could not hold them.
 
     The contour is located to a fraction of a pixel: distances are measured on the drawing's own raster and
     interpolated, so that a coarse canvas does not turn a slanted outline into stairs.
@@ -82,6 +88,9 @@ def make_canvas(figure: Figure, frame: ImageFrame, height_px: int) -> Canvas:
     mask = np.pad(mask, pad)
     distance = ndimage.distance_transform_edt(~mask) - ndimage.distance_transform_edt(mask)
     distance = ndimage.gaussian_filter(distance - 0.5 * np.sign(distance), 0.7)
+    # Smoothing by itself breaks lines of one pixel, hence the least radius.
+    strokes, _ = thicken(mask, max(0.5 * thinnest * scale_y / frame.units_per_px, HAIR_PX))
+    distance = np.minimum(distance, strokes)
 
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     tall, wide = rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1
