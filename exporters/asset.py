@@ -75,7 +75,7 @@ class TexturedMesh:
     parts : (V,) uint8 part label per vertex (`fig2mesh.records.PART_NAMES`), 0 none
     solid_index : (V,) int32, the vertex of the unsplit solid that each vertex came from: faces mapped through it
         form a closed, oriented, manifold surface
-    deviation_m : measured mean and maximum distance to the finest mesh, metres; (0, 0) for the finest itself
+    deviation_m : measured mean and maximum distance to the surface before simplification, metres
     """
 
     vertices: FloatArray

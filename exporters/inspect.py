@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -36,20 +37,30 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
     path = Path(path)
     if not path.exists():
         raise ExportError(path, "is not there", "check the name")
-    suffix = path.suffix.lower()
-    if path.is_dir() or suffix == ".json":
-        found = _inspect_tileset(path / "tileset.json" if path.is_dir() else path)
-    elif suffix in (".glb", ".gltf"):
-        found = _inspect_gltf(path)
-    elif suffix in (".usda", ".usdc", ".usdz"):
-        found = _inspect_usd(path)
-    elif suffix in (".ply", ".obj"):
-        found = _inspect_triangles(path)
-    else:
-        raise ExportError(path, f"cannot inspect suffix {suffix or 'none'}", "see exporters.write.FORMATS")
+    try:
+        found = _inspect_any(path)
+    except (AttributeError, ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+        if isinstance(error, ExportError):
+            raise
+        # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
+        reason = " ".join(str(error).split())[:120]
+        raise ExportError(path, f"damaged ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
     keys = ("format", "files", "name", "copyright", "generator", "vertices", "triangles", "bounds_m", "size_m")
     more = ("watertight", "solid", "components", "genus", "volume_m3", "texture_px", "parts", "placement", "lods")
     return {key: found.get(key) for key in (*keys, *more, "metadata")}
+
+
+def _inspect_any(path: Path) -> dict[str, Any]:
+    suffix = path.suffix.lower()
+    if path.is_dir() or suffix == ".json":
+        return _inspect_tileset(path / "tileset.json" if path.is_dir() else path)
+    if suffix in (".glb", ".gltf"):
+        return _inspect_gltf(path)
+    if suffix in (".usda", ".usdc", ".usdz"):
+        return _inspect_usd(path)
+    if suffix in (".ply", ".obj"):
+        return _inspect_triangles(path)
+    raise ExportError(path, f"cannot inspect suffix {suffix or 'none'}", "see exporters.write.FORMATS")
 
 
 def _solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
@@ -232,8 +243,9 @@ def _comments(path: Path) -> dict[str, Any]:
             key, _, value = rest.replace(": ", " ", 1).partition(" ")
             if key in ("copyright", "generator"):
                 facts[key] = value
-            elif key.endswith(("_deg", "_m")):
-                place[key] = float(value)
+            elif key in ("lon_deg", "lat_deg", "height_m", "heading_deg", "figure_height_m"):
+                with suppress(ValueError):
+                    place[key] = float(value)
             elif key in ("crs", "height_datum"):
                 place[key] = value
     return facts | {"placement": place or None}

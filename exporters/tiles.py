@@ -40,9 +40,9 @@ BOX_MARGIN_M = 1e-3
 """Rounding, of a viewer's float32 too, must not push a vertex out of its volume; nor may a volume be flat."""
 
 
-def content_name(asset: Asset, lod: int) -> str:
-    """File name of a level of detail: `name.glb`, `name_lod1.glb`, ..."""
-    return safe_name(asset.name) + (f"_lod{lod}" if lod else "") + ".glb"
+def content_name(name: str, lod: int) -> str:
+    """File name of a level of detail of the asset called `name`: `name.glb`, `name_lod1.glb`, ..."""
+    return safe_name(name) + (f"_lod{lod}" if lod else "") + ".glb"
 
 
 def safe_name(name: str) -> str:
@@ -64,7 +64,7 @@ def write_tileset(asset: Asset, path: Path | str, visible_from_m: float = DEFAUL
     document = tileset(asset, visible_from_m)
     folder.mkdir(parents=True, exist_ok=True)
     for lod in range(len(asset.lods)):
-        (folder / content_name(asset, lod)).write_bytes(glb_bytes(asset, lod))
+        (folder / content_name(asset.name, lod)).write_bytes(glb_bytes(asset, lod))
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)
     (folder / "tileset.json").write_bytes(text.encode() + b"\n")
 
@@ -112,7 +112,7 @@ def root_tile(asset: Asset, folder: str = "") -> dict[str, Any]:
     errors = np.maximum.accumulate([0.0, *(mesh.deviation_m[1] for mesh in asset.lods[1:])]).tolist()
     tile: dict[str, Any] = {}
     for lod, error in enumerate(errors):
-        uri = quote(folder + content_name(asset, lod))
+        uri = quote(folder + content_name(asset.name, lod))
         children = {"children": [tile]} if tile else {}
         tile = {"boundingVolume": volume, "geometricError": error, "content": {"uri": uri}, **children}
     return {"transform": column_major(ecef_from_tile(asset.placement)), "refine": "REPLACE", **tile}

@@ -29,18 +29,28 @@ def validate(path: str | os.PathLike[str], external: bool = True) -> list[Findin
     path = Path(path)
     if not path.exists():
         raise ExportError(path, "is not there", "check the name")
+    try:
+        findings = _check_any(path, external)
+    except (AttributeError, ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+        if isinstance(error, ExportError):
+            raise
+        # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
+        reason = " ".join(str(error).split())[:120]
+        findings = [Finding("error", "DAMAGED", f"{type(error).__name__}: {reason}", path.name)]
+    return sorted(findings, key=lambda finding: ("error", "warning", "info").index(finding.severity))
+
+
+def _check_any(path: Path, external: bool) -> list[Finding]:
     suffix = path.suffix.lower()
     if path.is_dir() or suffix == ".json":
-        findings = check_tileset(path, external)
-    elif suffix in (".glb", ".gltf"):
-        findings = check_gltf(path, external)
-    elif suffix in (".usda", ".usdc", ".usdz"):
-        findings = check_usd(path)
-    elif suffix in (".ply", ".obj"):
-        findings = _check_triangles(path)
-    else:
-        raise ExportError(path, f"no check for suffix {suffix or 'none'}", "see exporters.write.FORMATS")
-    return sorted(findings, key=lambda finding: ("error", "warning", "info").index(finding.severity))
+        return check_tileset(path, external)
+    if suffix in (".glb", ".gltf"):
+        return check_gltf(path, external)
+    if suffix in (".usda", ".usdc", ".usdz"):
+        return check_usd(path)
+    if suffix in (".ply", ".obj"):
+        return _check_triangles(path)
+    raise ExportError(path, f"no check for suffix {suffix or 'none'}", "see exporters.write.FORMATS")
 
 
 def read_triangles(path: Path) -> Any:

@@ -19,7 +19,7 @@ from exporters.errors import ExportError
 from exporters.glb import write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
-from exporters.tiles import DEFAULT_VISIBLE_FROM_M, write_tileset
+from exporters.tiles import DEFAULT_VISIBLE_FROM_M, content_name, write_tileset
 from exporters.usd import write_usd
 
 OutputPath = str | os.PathLike[str]
@@ -62,11 +62,12 @@ def is_tileset(path: OutputPath) -> bool:
     return file.is_dir() and file.suffix.lower() not in FORMATS  # such as maps/v1.2
 
 
-def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False) -> None:
+def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: str = "", lods: int = 1) -> None:
     """Find out before the work begins what would keep outputs from being written.
 
     paths : all outputs of one asset
     overwrite : existing files may be replaced
+    name, lods : of the asset to come, from which the files beside a tileset.json get their names
 
     Raises ExportError naming the first output with an unknown suffix, in a folder that cannot be written to, that
     exists although `overwrite` is off, or that is asked for twice.
@@ -75,7 +76,7 @@ def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False) -> None:
     for path in paths:
         main = _main_file(path)
         _check(path, main, overwrite)
-        for companion in _companions(path):
+        for companion in _companions(path, name, lods):
             if companion.exists() and not overwrite:
                 raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
         key = os.path.abspath(main)
@@ -124,9 +125,9 @@ def _main_file(path: OutputPath) -> Path:
     return file
 
 
-def _companions(path: OutputPath) -> list[Path]:
+def _companions(path: OutputPath, name: str, lods: int) -> list[Path]:
     if is_tileset(path):
-        return []
+        return [_main_file(path).with_name(content_name(name, lod)) for lod in range(lods)] if name else []
     file = Path(path)
     return [file.with_name(file.stem + ending) for ending in FORMATS[file.suffix.lower()].beside]
 

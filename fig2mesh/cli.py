@@ -29,7 +29,7 @@ class MainJobGroup(click.Group):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         # Options of the main job may come before the figure; the group itself only knows these two.
-        if args and args[0] not in (*self.commands, "--help", "--version"):
+        if args and args[0] not in (*self.commands, "-h", "--help", "--version"):
             args = ["make", *args]
         return super().parse_args(ctx, args)
 
@@ -72,7 +72,7 @@ def cli() -> None:
     help="What --altitude is measured from.",
 )  # fmt: skip
 @click.option(
-    "-o", "--output", "outputs", type=FILE, multiple=True, metavar="OUT",
+    "-o", "--output", "outputs", multiple=True, metavar="OUT",
     help=".glb .gltf .usda .usdc .usdz .ply .obj, or a folder / tileset.json for 3D Tiles; repeatable. "
     "Default: FIGURE's stem + .glb in the current folder.",
 )  # fmt: skip
@@ -176,7 +176,7 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo("fig2mesh: " + " ".join(str(error).split()), err=True)
         return 2
     except (KeyboardInterrupt, click.Abort):
-        click.echo("fig2mesh: interrupted; nothing was written", err=True)
+        click.echo("fig2mesh: interrupted; no output is half-written", err=True)
         return 130
     except SystemExit as error:
         return error.code if isinstance(error.code, int) else 1

@@ -11,7 +11,7 @@ SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 li
 PACKAGES = {
     "numpy": "numpy", "scipy": "scipy", "numba": "numba", "torch": "torch", "open3d": "open3d-cpu",
     "pymeshlab": "pymeshlab", "fast_simplification": "fast-simplification", "xatlas": "xatlas", "trimesh": "trimesh",
-    "pxr": "usd-core", "pyproj": "pyproj", "pygltflib": "pygltflib", "skimage": "scikit-image",
+    "pxr": "usd-core", "pyproj": "pyproj", "skimage": "scikit-image",
 }  # fmt: skip
 
 
@@ -26,19 +26,36 @@ def examine() -> Iterator[tuple[str, bool, str]]:
             yield distribution, False, f"{reason[:200]}{remedy}"
             continue
         yield distribution, True, version(distribution)
-    import pymeshlab
+    yield _filters()
+    yield _gpu()
 
-    # Without libOpenGL the import succeeds and the filters are silently missing.
-    usable = hasattr(pymeshlab.MeshSet(), "meshing_close_holes")
-    yield "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
-    import torch
 
-    yield "GPU", True, torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none (not needed)"
+def _filters() -> tuple[str, bool, str]:
+    """Without libOpenGL importing pymeshlab succeeds and the filters are silently missing."""
+    try:
+        import pymeshlab
+
+        usable = hasattr(pymeshlab.MeshSet(), "meshing_close_holes")
+    except ImportError:
+        usable = False
+    return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
+
+
+def _gpu() -> tuple[str, bool, str]:
+    try:
+        import torch
+
+        found = torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none (not needed)"
+    except Exception as error:
+        return "GPU", False, " ".join(str(error).split())[:200]
+    return "GPU", True, found
 
 
 def version(distribution: str) -> str:
-    """Version of an installed distribution, "" where it is not installed."""
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return ""
+    """Version of an installed distribution, "" where it is not installed; Open3D has two names."""
+    for name in (distribution, distribution.removesuffix("-cpu")):
+        try:
+            return importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return ""

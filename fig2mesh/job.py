@@ -6,11 +6,11 @@ import hashlib
 import json
 import logging
 import os
-import resource
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,17 @@ from exporters.asset import Asset
 from exporters.write import check_outputs, is_tileset, write
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
+from fig2mesh.records import Figure
 from fig2mesh.report import Timing, make_report
-from fig2mesh.settings import STAGES, Settings, settings_for
+from fig2mesh.settings import FIRST_USE, STAGES, Settings, settings_for
 from georef.bearing import parse_facing
 from georef.heights import ellipsoidal_height
 from georef.placement import GeoPlacement
 
 log = logging.getLogger("fig2mesh")
+
+REQUEST = "request"
+"""Name of the stage file that says what the others were made for."""
 
 
 def run(
@@ -35,7 +39,7 @@ def run(
     height_m: float,
     altitude: float,
     altitude_datum: str,
-    outputs: tuple[Path, ...],
+    outputs: tuple[str, ...],
     mask: Path | None,
     keypoints: Path | None,
     part_labels: Path | None,
@@ -61,31 +65,40 @@ def run(
     """What `fig2mesh FIGURE …` does; the parameters are the options of the command line."""
     _configure_logging(quiet, verbose)
     placement = _placement(lonlat, facing, height_m, altitude, altitude_datum)
-    targets = outputs or (Path(figure.stem + ".glb"),)
+    targets = outputs or (figure.stem + ".glb",)
     # Everything that can be refused is refused before the work begins.
     if resume_from is not None and resume_from not in STAGES:
         raise InputError("--resume-from", f"{resume_from} is no stage", f"choose from {', '.join(STAGES)}")
     if resume_from is not None and save_stages is None:
         raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
-    _check_targets(targets, placement, overwrite)
+    _check_targets(targets, figure.stem, lods, placement, overwrite)
+    if not 0 < visible_from < 1e9:
+        raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
         _check_report(report, overwrite)
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
+    if lods > 1 and resume_from is None and not any(is_tileset(target) for target in targets):
+        log.info("--lods %d: only 3D Tiles have levels of detail; one is made", lods)
+        lods = 1
     settings = settings_for(
         quality, triangles=triangles, texture_size=texture_size, lods=lods, mesher=mesher, closing=closing,
         parts=parts, device=_device(device), seed=seed,
     )  # fmt: skip
+    stages = None if save_stages is None else _stages(save_stages, drawn, settings, resume_from)
 
-    from fig2mesh.parse.frame import image_frame
     from fig2mesh.parts.pieces import clean
 
-    drawn, pieces, specks = clean(drawn, image_frame(drawn), settings.voxel)
+    drawn, pieces, specks = clean(drawn, settings.voxel)
     if specks:
         log.warning("%s: %d specks of the silhouette are too small to model and were left out", figure, specks)
     results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
     timings: list[Timing] = []
+    written: list[Path] = []
     with _progress(quiet) as advance:
-        _run_steps(settings, height_m, results, timings, save_stages, resume_from, advance)
+        _run_steps(settings, height_m, results, timings, stages, resume_from, advance)
+        found = results["solid"].how
+        if found.components != pieces:
+            log.warning("%s: %d solids for %d drawn pieces; %s", figure, found.components, pieces, found.note)
         asset = Asset(
             name=drawn.name,
             lods=results["model"],
@@ -97,13 +110,13 @@ def run(
         for target in targets:
             advance(f"write {target}")
             start = time.perf_counter()
-            write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
-            timings.append(Timing(f"write {target.name}", time.perf_counter() - start, _peak_mb()))
+            written += write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
+            timings.append(Timing(f"write {target}", time.perf_counter() - start, _peak_mb()))
     if report is not None:
-        facts = make_report(figure, asset, results, settings, height_m)
+        inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
+        facts = make_report(inputs, written, asset, results, settings, height_m)
         facts["stages"] = [timing.as_dict() for timing in timings]
-        facts["outputs"] = [str(target) for target in targets]
-        _write_text(report, json.dumps(facts, indent=2) + "\n")
+        _write_text(report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     for target in targets:
         log.info("%s", target)
 
@@ -121,21 +134,9 @@ def _run_steps(
     from fig2mesh.stages import load_stage, save_stage
 
     road = steps(settings, height_m)
-    names = [step.name for step in road]
-    first = 0
-    if resume_from is not None:
-        if resume_from not in names:
-            raise InputError(
-                "--resume-from", f"{resume_from} is not run with --mesher {settings.mesher}", "choose another"
-            )
-        first = names.index(resume_from)
-        assert folder is not None
-        if load_stage(folder, "figure") != _identity(results["figure"]):
-            raise InputError(
-                "--resume-from", "the stages were made from another figure", "pass that figure or run anew"
-            )
-    elif folder is not None:
-        save_stage(folder, "figure", _identity(results["figure"]))
+    first = 0 if resume_from is None else next(i for i, step in enumerate(road) if step.name == resume_from)
+    if "cloud" not in (step.name for step in road):
+        timings.append(Timing("cloud", 0.0, _peak_mb(), skipped="the isosurface needs no points"))
     for index, step in enumerate(road):
         advance(step.name)
         start = time.perf_counter()
@@ -151,12 +152,29 @@ def _run_steps(
             save_stage(folder, step.name, results[step.name])
 
 
-def _identity(figure: Any) -> str:
-    """Tells figures apart: a hash of everything that the pipeline sees of one."""
+def _stages(folder: Path, figure: Figure, settings: Settings, resume_from: str | None) -> Path:
+    """Make the folder of stages ready: empty of other runs, or checked to be of this one where it goes on."""
+    from fig2mesh.stages import clear_stages, load_stage, save_stage
+
     digest = hashlib.sha256()
     for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
         digest.update(str(array.shape).encode() + array.tobytes())
-    return digest.hexdigest()
+    request = {"figure": digest.hexdigest(), **asdict(settings)}
+    if resume_from is None:
+        clear_stages(folder)
+        save_stage(folder, REQUEST, request)
+        return folder
+    before = load_stage(folder, REQUEST)
+    if resume_from == "cloud" and settings.mesher == "isosurface":
+        raise InputError("--resume-from", "cloud is not run with --mesher isosurface", "choose another stage")
+    if before.get("figure") != request["figure"]:
+        raise InputError("--resume-from", "the stages were made from another figure", "pass that figure, or run anew")
+    start = STAGES.index(resume_from)
+    for name, stage in FIRST_USE.items():
+        if STAGES.index(stage) < start and before.get(name) != request[name]:
+            found = f"the stages were made with {name} {before.get(name)}, not {request[name]}"
+            raise InputError("--resume-from", found, f"start at {stage} or earlier")
+    return folder
 
 
 def _placement(
@@ -170,19 +188,21 @@ def _placement(
             raise InputError("--altitude", "given without a place", "pass --lonlat LON LAT as well")
         return None
     lon, lat = lonlat
+    if not -12_000 <= altitude <= 1e7:
+        raise InputError("--altitude", f"{altitude:g} m", "give metres above the datum, at most 10,000 km")
     place = GeoPlacement(lon, lat, altitude, datum, heading, height_m)
     height = ellipsoidal_height(lon, lat, altitude, datum)
     name = datum if datum in ("ellipsoid", "egm96") else Path(datum).name
     return GeoPlacement(place.lon_deg, place.lat_deg, height, name, heading, height_m)
 
 
-def _check_targets(targets: tuple[Path, ...], placement: GeoPlacement | None, overwrite: bool) -> None:
-    if len({target.resolve() for target in targets}) < len(targets):
-        raise OutputError("-o", "the same output is named twice", "name each output once")
+def _check_targets(
+    targets: tuple[str, ...], name: str, lods: int, placement: GeoPlacement | None, overwrite: bool
+) -> None:
     for target in targets:
         if placement is None and is_tileset(target):
             raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT")
-    check_outputs(targets, overwrite=overwrite)
+    check_outputs(targets, overwrite=overwrite, name=name, lods=lods)
 
 
 def _device(name: str) -> str:
@@ -225,7 +245,11 @@ def _write_text(path: Path, text: str) -> None:
 
 
 def _peak_mb() -> float:
-    """Largest resident size of the process so far, MiB."""
+    """Largest resident size of the process so far, MiB; 0 where the system does not tell."""
+    try:
+        import resource
+    except ImportError:
+        return 0.0
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1 << 20) if sys.platform == "darwin" else peak / 1024
 

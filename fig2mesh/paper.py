@@ -6,6 +6,3 @@ from typing import Final
 
 FIGURE_HEIGHT: Final = 1.79
 """Height of every figure, units (and metres unless asked otherwise); §4.1, "uniformly to 1.79m"."""
-
-VIEWS: Final = ("front", "left", "back", "right")
-"""The four orthographic views; §3."""

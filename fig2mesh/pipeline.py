@@ -14,7 +14,7 @@ import numpy as np
 
 from exporters.asset import Texture, TexturedMesh
 from fig2mesh.field.body import Body
-from fig2mesh.mesh.bake import Baked, bake, vertex_colors
+from fig2mesh.mesh.bake import Baked, bake
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.mesh.scan import scan
 from fig2mesh.mesh.simplify import deviation, simplify
@@ -28,6 +28,8 @@ from fig2mesh.pose.prior import lift
 from fig2mesh.records import ByteArray, Figure, Mesh, PointCloud, Pose3D, UvMesh
 from fig2mesh.settings import Settings
 from fig2mesh.texture.sources import make_sources
+
+LEAST_TEXELS = 128
 
 
 @dataclass(frozen=True)
@@ -72,9 +74,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         return tuple(simplify(solid.mesh, max(settings.triangles // 4**level, 200)) for level in range(settings.lods))
 
     def unwrap_levels(levels: tuple[Mesh, ...]) -> tuple[UvMesh, ...]:
-        return tuple(
-            unwrap(mesh, texture_size=max(settings.texture_size >> level, 128)) for level, mesh in enumerate(levels)
-        )
+        return tuple(unwrap(mesh, texture_size=_texels(settings, level)) for level, mesh in enumerate(levels))
 
     def bake_levels(figure: Figure, outline: Outline, body: Body, unwrapped: tuple[UvMesh, ...]) -> tuple[Baked, ...]:
         frame = image_frame(figure)
@@ -86,7 +86,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
                 _face_parts(mesh.solid, body),
                 sources,
                 frame,
-                max(settings.texture_size >> level, 128),
+                _texels(settings, level),
             )
             for level, mesh in enumerate(unwrapped)
         )
@@ -108,7 +108,6 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
                     uv=mesh.uv,
                     texture=Texture(texture.color),
                     observed=Texture(texture.observed[..., None]),
-                    colors=vertex_colors(mesh, texture),
                     parts=_labels(body, mesh.solid.vertices)[mesh.solid_index],
                     deviation_m=(mean * scale, worst * scale),
                 )
@@ -132,9 +131,14 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
     )
 
 
+def _texels(settings: Settings, level: int) -> int:
+    """Texels a side: half as many with each level, but enough to have charts."""
+    return max(settings.texture_size >> level, min(settings.texture_size, LEAST_TEXELS))
+
+
 def _labels(body: Body, points: np.ndarray) -> ByteArray:
     """(N,) uint8 part label nearest to each point."""
-    return np.array([part.part for part in body.parts], np.uint8)[body.nearest_part(points)]
+    return body.labels[body.nearest_part(points)]
 
 
 def _face_parts(mesh: Mesh, body: Body) -> ByteArray:

@@ -36,27 +36,6 @@ PART_NAMES: tuple[str, ...] = (
 PART: dict[str, int] = {name: index for index, name in enumerate(PART_NAMES)}
 BODY_PARTS: range = range(1, 15)
 
-ANCHORS: dict[int, tuple[int, ...]] = {
-    PART[part]: tuple(JOINT[joint] for joint in joints)
-    for part, joints in {
-        "torso": ("l_shoulder", "r_shoulder", "l_hip", "r_hip"),
-        "head": ("neck", "head"),
-        **{
-            f"{side}_{part}": (f"{side}_{first}", f"{side}_{second}")
-            for side in "lr"
-            for part, first, second in (
-                ("upper_arm", "shoulder", "elbow"),
-                ("lower_arm", "elbow", "wrist"),
-                ("hand", "wrist", "hand"),
-                ("upper_leg", "hip", "knee"),
-                ("lower_leg", "knee", "ankle"),
-                ("foot", "ankle", "foot"),
-            )
-        },
-    }.items()
-}
-"""The joints a part hangs on (paper §4.2): two for each part, four for the torso."""
-
 
 def frozen_array(array: Any, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
     """A read-only, C-ordered copy of `array`, checked against `shape` (None: any length)."""

@@ -39,9 +39,14 @@ class Timing:
 
 
 def make_report(
-    source: Path, asset: Asset, results: dict[str, Any], settings: Settings, height_m: float
+    inputs: list[Path],
+    outputs: list[Path],
+    asset: Asset,
+    results: dict[str, Any],
+    settings: Settings,
+    height_m: float,
 ) -> dict[str, Any]:
-    """Everything but the timings.
+    """Everything but the timings; inputs and outputs with their hashes, the figure first.
 
     The silhouette and the front view are measured on the finest textured mesh as it goes to the exporters, rendered
     orthographically at the drawing's resolution.
@@ -55,10 +60,12 @@ def make_report(
     origin_px = float(origin[0]), float(origin[1])
     front = front_similarity(asset.mesh, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     iou = silhouette_iou(asset.mesh, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    covered = [baked.observed[baked.covered] for baked in results["bake"][:1]]
+    baked = results["bake"][0]
     return {
         "fig2mesh": __version__,
-        "figure": {"file": source.name, "sha256": _sha256(source), "pieces": results["pieces"]},
+        "figure": {"file": inputs[0].name, "pieces": results["pieces"]},
+        "inputs": {str(path): _sha256(path) for path in inputs},
+        "outputs": {str(path): _sha256(path) for path in outputs},
         "settings": asdict(settings),
         "placement": asdict(asset.placement) if asset.placement else None,
         "measures": {
@@ -67,7 +74,7 @@ def make_report(
             "silhouette_iou": iou,
             "front_psnr_db": front.psnr_db,
             "front_ssim": front.ssim,
-            "texels_observed": float(np.mean(covered[0] > 0)),
+            "texels_observed": float((baked.observed[baked.covered] > 0).sum()) / max(int(baked.covered.sum()), 1),
         },
         "lods": [
             {"triangles": len(m.faces), "mean_deviation_m": m.deviation_m[0], "max_deviation_m": m.deviation_m[1]}

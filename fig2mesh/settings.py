@@ -14,11 +14,11 @@ Closing = Literal["pymeshlab", "fill"]
 class Settings:
     """Parameters of the pipeline; lengths in FIGURE units (a figure is 1.79 high).
 
-    canvas_px : longer side of the raster on which outlines are inflated
+    canvas_px : longest side of the raster on which outlines are inflated
     voxel : spacing of the part grids
     spacing : distance between neighbouring points of the scan
     triangles : of the finest mesh
-    texture_size : texels along each side of the square texture; 0: no texture
+    texture_size : texels along each side of the square texture
     lods : number of meshes, the finest included; each has a quarter of the triangles of the one before
     mesher : how the surface becomes a mesh
     closing : what closes the holes that ball pivoting leaves
@@ -42,6 +42,12 @@ class Settings:
 
 STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "bake", "model")
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
+
+FIRST_USE = {
+    "canvas_px": "parts", "voxel": "parts", "parts": "parts", "spacing": "cloud", "seed": "cloud", "mesher": "solid",
+    "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
+}  # fmt: skip
+"""Setting → the first stage that it changes."""
 
 PRESETS: dict[Quality, Settings] = {
     "draft": Settings(canvas_px=256, voxel=0.01, spacing=0.012, triangles=6_000, texture_size=512),

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from fig2mesh.errors import FigureError, OutputError
+from fig2mesh.settings import STAGES
 
 
 def _classes() -> dict[str, type]:
@@ -48,6 +49,13 @@ def save_stage(folder: Path, stage: str, value: object) -> None:
         partial.unlink(missing_ok=True)
         found = f"{target}: {error.strerror}"
         raise OutputError("--save-stages", found, "choose a folder that can be written") from None
+
+
+def clear_stages(folder: Path) -> None:
+    """Remove what an earlier run kept, so that its stages are not taken for this one's."""
+    for path in folder.glob("*.npz"):
+        if path.stem in (*STAGES, "request"):
+            path.unlink()
 
 
 def load_stage(folder: Path, stage: str) -> Any:

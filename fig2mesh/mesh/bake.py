@@ -73,12 +73,6 @@ def bake(
     return Baked(image[tuple(source)], observed[tuple(source)], covered)
 
 
-def vertex_colors(mesh: UvMesh, baked: Baked) -> ByteArray:
-    """(V, 3) uint8 colour of each split vertex, for formats without textures."""
-    size = baked.color.shape[0]
-    return np.clip(np.round(_bilinear(baked.color.astype(np.float32), mesh.uv * size)), 0, 255).astype(np.uint8)
-
-
 def _seen(
     mesh: UvMesh, face: NDArray[np.int32], points: NDArray[np.float64], smooth: NDArray[np.float64]
 ) -> NDArray[np.bool_]:

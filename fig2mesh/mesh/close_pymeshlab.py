@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from fig2mesh.doctor import SYSTEM_LIBRARIES
+from fig2mesh.errors import InputError
 from fig2mesh.mesh.topology import as_mesh
 from fig2mesh.records import Mesh
 
 LARGEST_HOLE = 2000
 """Edges of the largest hole to close."""
+
+
+REMEDY = f"run `{SYSTEM_LIBRARIES}` (Debian), or pass --closing fill"
 
 
 def close_pymeshlab(mesh: Mesh) -> Mesh:
@@ -20,17 +25,11 @@ def close_pymeshlab(mesh: Mesh) -> Mesh:
     try:
         import pymeshlab
     except ImportError as error:
-        raise RuntimeError(
-            f"pymeshlab: cannot be imported ({error}); install `pymeshlab` and, on Debian, "
-            "`apt-get install libgl1 libegl1 libopengl0 libusb-1.0-0`, or close by method='fill'"
-        ) from error
+        raise InputError("--closing pymeshlab", f"cannot be imported ({error})", REMEDY) from error
     scene = pymeshlab.MeshSet(verbose=False)
     # Without libopengl0 the import passes, the plugins are not loaded, and filters are missing without a word.
     if not hasattr(scene, "meshing_close_holes"):
-        raise RuntimeError(
-            "pymeshlab: the filter meshing_close_holes is missing, so its plugins could not be loaded; "
-            "`apt-get install libgl1 libegl1 libopengl0 libusb-1.0-0`, or close by method='fill'"
-        )
+        raise InputError("--closing pymeshlab", "its plugins could not be loaded", REMEDY)
     scene.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))
     scene.meshing_close_holes(maxholesize=LARGEST_HOLE, newfaceselected=False, selfintersection=False)
     closed = scene.current_mesh()

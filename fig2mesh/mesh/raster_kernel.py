@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fig2mesh.field.compiled import kernel
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+
+@kernel
 def rasterise_triangles(
     corners: NDArray[np.float64],
     faces: NDArray[np.int32],

@@ -27,12 +27,14 @@ class Meshing:
 
     mesher : "ball-pivot" or "isosurface"; what made the mesh in the end
     closing : the report of closing; None for the isosurface, which is closed from the start
+    components : of the mesh
     crumbs : components dropped because they are no piece of the drawing
     note : "" or why the mesher asked for was not the one used
     """
 
     mesher: str
     closing: CloseReport | None
+    components: int
     crumbs: int
     note: str = ""
 
@@ -58,17 +60,17 @@ def make_solid(cloud: PointCloud | None, body: Body, settings: Settings, pieces:
     found = check_solid(mesh)
     if found.solid and found.components == pieces:
         mesher = "isosurface" if report.method == "isosurface" else "ball-pivot"
-        return Solid(mesh, Meshing(mesher, report, crumbs, report.fallback))
+        return Solid(mesh, Meshing(mesher, report, found.components, crumbs, report.fallback))
     reason = f"ball pivoting made {found.components} components of {pieces} drawn pieces"
     other = _by_isosurface(body, settings, pieces, reason)
-    if found.solid and check_solid(other.mesh).components != pieces:
-        return Solid(mesh, Meshing("ball-pivot", report, crumbs, reason))
+    if found.solid and other.how.components != pieces:
+        return Solid(mesh, Meshing("ball-pivot", report, found.components, crumbs, reason))
     return other
 
 
 def _by_isosurface(body: Body, settings: Settings, pieces: int, note: str) -> Solid:
     mesh, crumbs = _without_crumbs(isosurface(body, spacing=ISOSURFACE_SPACING * settings.spacing), pieces)
-    return Solid(mesh, Meshing("isosurface", None, crumbs, note))
+    return Solid(mesh, Meshing("isosurface", None, check_solid(mesh).components, crumbs, note))
 
 
 def _without_crumbs(mesh: Mesh, pieces: int) -> tuple[Mesh, int]:

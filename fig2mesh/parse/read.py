@@ -123,7 +123,7 @@ def _read_rgba(path: Path) -> ByteArray:
 def _read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:
     height, width = rgba.shape[:2]
     if path is None:
-        if (rgba[..., 3] == 255).all():
+        if (rgba[..., 3] >= 128).all():
             found = "no silhouette: the picture has no transparent background"
             raise FigureError(figure, found, "pass --mask PNG, or a picture with an alpha channel")
         return rgba[..., 3] >= 128

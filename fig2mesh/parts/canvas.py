@@ -14,7 +14,10 @@ from fig2mesh.parts.hairlines import thicken
 from fig2mesh.records import Figure
 
 CONTOUR_PX = 1024
-"""Longest side at which the contour is measured; finer would cost time and add pen jitter."""
+"""Pictures are reduced to between this and twice this many pixels; finer would cost time and add pen jitter."""
+
+LEAST_CONTOUR_PX = 256
+"""Smaller pictures are enlarged first: a limb of two pixels is still a limb."""
 
 MARGIN_PX = 4
 
@@ -24,7 +27,7 @@ HAIR_PX = 0.9
 
 @dataclass(frozen=True)
 class Canvas:
-    """The silhouette on a square raster around the figure.
+    """The silhouette on a raster of square pixels around the figure.
 
     sdf : (H, W) float64, signed distance to the drawn contour in FIGURE units, negative inside
     labels : (H, W) uint8, part labels given by the user, 0 elsewhere
@@ -62,39 +65,29 @@ class Canvas:
         return np.asarray(flat).reshape(rows.shape[:-1])
 
 
-def make_canvas(figure: Figure, frame: ImageFrame, height_px: int, thinnest: float = 0.0) -> Canvas:
-    """The silhouette of a figure, resampled so that its longer side has `height_px` pixels.
+def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: float = 0.0) -> Canvas:
+    """The silhouette of a figure, resampled so that its longer side has `longest_px` pixels.
 
     Strokes narrower than `thinnest` (FIGURE units) are drawn that wide: a grid could not hold them.
 
-    The contour is located to a fraction of a pixel: distances are measured on the drawing's own raster and
+    The contour is located to a fraction of a pixel: distances are measured on a raster of `CONTOUR_PX` and
     interpolated, so that a coarse canvas does not turn a slanted outline into stairs.
     """
-    mask = figure.mask
-    longest = max(mask.shape)
-    scale = 1.0
-    labels = figure.part_labels
-    if longest > CONTOUR_PX:
-        scale = CONTOUR_PX / longest
-        size = (max(1, round(mask.shape[1] * scale)), max(1, round(mask.shape[0] * scale)))
-        cover = Image.fromarray(np.where(mask, np.uint8(255), np.uint8(0))).resize(size, Image.Resampling.BOX)
-        labels = np.asarray(Image.fromarray(labels).resize(size, Image.Resampling.NEAREST))
-        scale_x, scale_y = size[0] / mask.shape[1], size[1] / mask.shape[0]
-        small = np.asarray(cover) >= 128
-        mask = small if small.any() else np.asarray(cover) == np.asarray(cover).max()
-    else:
-        scale_x = scale_y = 1.0
     pad = 2
-    mask = np.pad(mask, pad)
-    distance = ndimage.distance_transform_edt(~mask) - ndimage.distance_transform_edt(mask)
+    mask = np.pad(figure.mask, pad)
+    cover, scale = _contour_raster(mask)
+    solid = cover >= 0.5
+    if not solid.any():
+        solid = cover >= cover.max()
+    distance = ndimage.distance_transform_edt(~solid) - ndimage.distance_transform_edt(solid)
     distance = ndimage.gaussian_filter(distance - 0.5 * np.sign(distance), 0.7)
     # Smoothing by itself breaks lines of one pixel, hence the least radius.
-    strokes, _ = thicken(mask, max(0.5 * thinnest * scale_y / frame.units_per_px, HAIR_PX))
-    distance = np.minimum(distance, strokes)
+    units = frame.units_per_px / scale
+    distance = np.minimum(distance, thicken(solid, max(0.5 * thinnest / units, HAIR_PX)))
 
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows, columns = np.flatnonzero(solid.any(axis=1)), np.flatnonzero(solid.any(axis=0))
     tall, wide = rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1
-    step = max(tall, wide) / height_px
+    step = max(tall, wide) / longest_px
     margin = MARGIN_PX * step
     height, width = (int(np.ceil((length + 2 * margin) / step)) + 1 for length in (tall, wide))
     row = rows[0] - margin + step * np.arange(height)
@@ -102,10 +95,28 @@ def make_canvas(figure: Figure, frame: ImageFrame, height_px: int, thinnest: flo
     grid = np.meshgrid(row, column, indexing="ij")
     sampled = ndimage.map_coordinates(distance, grid, order=1, mode="nearest")
     # Beyond the measured raster distances only grow; the nearest value would flatten them.
-    beyond = np.hypot(*(np.maximum(0, np.maximum(-g, g - (n - 1))) for g, n in zip(grid, mask.shape, strict=True)))
-    chosen = ndimage.map_coordinates(np.pad(labels, pad), grid, order=0, mode="constant")
-
-    units_per_px = frame.units_per_px / scale_y
-    first = np.array([(column[0] - pad + 0.5) / scale_x, (row[0] - pad + 0.5) / scale_y])
+    beyond = np.hypot(*(np.maximum(0, np.maximum(-g, g - (n - 1))) for g, n in zip(grid, solid.shape, strict=True)))
+    source = [(g + 0.5) / scale - 0.5 for g in grid]
+    labels = ndimage.map_coordinates(np.pad(figure.part_labels, pad), source, order=0, mode="constant")
+    first = np.array([(column[0] + 0.5) / scale - pad, (row[0] + 0.5) / scale - pad])
     x, y = frame.figure_from_image(first)
-    return Canvas((sampled + beyond) * units_per_px, chosen, (float(x), float(y)), float(step * units_per_px))
+    return Canvas((sampled + beyond) * units, labels, (float(x), float(y)), float(step * units))
+
+
+def _contour_raster(mask: NDArray[np.bool_]) -> tuple[NDArray[np.float32], float]:
+    """Coverage of the silhouette on a raster fine enough to measure, and its pixels per pixel of the mask.
+
+    The factor is whole (or one over a whole number), so that it is the same in both directions.
+    """
+    longest = max(mask.shape)
+    if longest >= 2 * CONTOUR_PX:
+        factor = longest // CONTOUR_PX
+        image = Image.fromarray(np.where(mask, np.uint8(255), np.uint8(0))).reduce(factor)
+        # The last row and column may be cut short; the padding of the mask is wider than what is lost there.
+        return np.asarray(image, np.float32) / 255.0, 1.0 / factor
+    factor = -(-LEAST_CONTOUR_PX // longest)
+    if factor == 1:
+        return mask.astype(np.float32), 1.0
+    axes = [(np.arange(length * factor) + 0.5) / factor - 0.5 for length in mask.shape]
+    grid = np.meshgrid(*axes, indexing="ij")
+    return np.asarray(ndimage.map_coordinates(mask.astype(np.float32), grid, order=1, mode="nearest")), float(factor)

@@ -9,7 +9,7 @@ from scipy import ndimage
 EIGHT = np.ones((3, 3))
 
 
-def thicken(mask: NDArray[np.bool_], radius: float) -> tuple[NDArray[np.float64], int]:
+def thicken(mask: NDArray[np.bool_], radius: float) -> NDArray[np.float64]:
     """Distance to the middle lines of everything thinner than `radius` pixels from middle to rim.
 
     Corners are thin too at their very tip; they are left alone. What counts are strokes: residues of a morphological
@@ -17,9 +17,8 @@ def thicken(mask: NDArray[np.bool_], radius: float) -> tuple[NDArray[np.float64]
 
     Returns
     -------
-    distance : (H, W) float64 pixels to the nearest middle line minus `radius`: negative where a stroke should be;
-        infinite where there are no strokes
-    strokes : how many there are
+    (H, W) float64, pixels to the nearest middle line minus `radius`: negative where a stroke should be; infinite
+    everywhere where there are no strokes
     """
     from skimage.morphology import skeletonize
 
@@ -30,7 +29,7 @@ def thicken(mask: NDArray[np.bool_], radius: float) -> tuple[NDArray[np.float64]
     opened = ndimage.distance_transform_edt(~core) <= radius + 0.5 if core.any() else np.zeros_like(mask)
     residue, count = ndimage.label(mask & ~opened, EIGHT)
     if not count:
-        return none, 0
+        return none
     pieces, _ = ndimage.label(opened, EIGHT)
     long = np.bincount(residue.ravel(), minlength=count + 1) >= (4.0 * radius) ** 2
     strokes = np.zeros(count + 1, bool)
@@ -41,5 +40,5 @@ def thicken(mask: NDArray[np.bool_], radius: float) -> tuple[NDArray[np.float64]
         strokes[index] = long[index] or (joined > 0).sum() > 1 or not (joined > 0).any()
     middle = skeletonize(mask) & strokes[residue]
     if not middle.any():
-        return none, 0
-    return ndimage.distance_transform_edt(~middle) - radius, int(strokes.sum())
+        return none
+    return np.asarray(ndimage.distance_transform_edt(~middle) - radius)

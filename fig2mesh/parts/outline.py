@@ -25,7 +25,8 @@ from fig2mesh.records import BODY_PARTS, PART, BoolArray, PartSdf, Pose3D
 OVERLAP = 0.025
 """How far neighbouring parts of one layer reach into each other, FIGURE units."""
 
-LEAST_NODES, MOST_NODES = 16, 192
+LEAST_NODES, MOST_NODES = 64, 192
+"""The paper's grids have 64 nodes an edge (§4.2); small parts have fingers and need them more than large ones."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ def _part_field(
     cut = (ndimage.distance_transform_edt(~here) - ndimage.distance_transform_edt(here)) * canvas.pitch
     cut = ndimage.gaussian_filter(cut, 2.0) - OVERLAP
     solid = (surface.u > 0) & (cut < 0)
+    if not solid.any():
+        return None
     rows, columns = np.nonzero(solid)
     half = np.sqrt(surface.u[solid])
     points = canvas.points()

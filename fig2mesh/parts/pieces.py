@@ -7,24 +7,40 @@ from dataclasses import replace
 import numpy as np
 from scipy import ndimage
 
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.parse.frame import image_frame
 from fig2mesh.records import Figure
 
 SPECK = 3.0
-"""Pieces smaller than this many voxels across cannot be told from dirt."""
+"""Pieces that are smaller than this many voxels in both directions cannot be told from dirt."""
+
+MARGIN_PX = 4
 
 
-def clean(figure: Figure, frame: ImageFrame, voxel: float) -> tuple[Figure, int, int]:
+def clean(figure: Figure, voxel: float) -> tuple[Figure, int, int]:
     """The figure without specks that no grid could hold, the number of pieces kept and of specks dropped.
 
-    Pieces are 8-connected. The largest one is always kept.
+    Pieces are 8-connected. The largest one is always kept. The picture is cut down to the silhouette and the joints,
+    so that nothing that follows depends on how much of a sheet lies around the figure.
     """
     pieces, count = ndimage.label(figure.mask, np.ones((3, 3)))
-    areas = np.bincount(pieces.ravel(), minlength=count + 1)[1:] * frame.units_per_px**2
-    kept = areas >= (SPECK * voxel) ** 2
+    windows = ndimage.find_objects(pieces)
+    areas = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
+    extent = np.array([max(s.stop - s.start for s in window) for window in windows])
+    kept = extent * image_frame(figure).units_per_px >= SPECK * voxel
     kept[np.argmax(areas)] = True
-    if kept.all():
-        return figure, count, 0
-    mask = np.isin(pieces, np.flatnonzero(kept) + 1)
-    labels = np.where(mask, figure.part_labels, 0)
-    return replace(figure, mask=mask, part_labels=labels), int(kept.sum()), int((~kept).sum())
+    mask = figure.mask if kept.all() else np.isin(pieces, np.flatnonzero(kept) + 1)
+
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    low = np.minimum([columns[0], rows[0]], np.floor(figure.joints_px.min(axis=0))) - MARGIN_PX
+    high = np.maximum([columns[-1], rows[-1]], np.ceil(figure.joints_px.max(axis=0))) + 1 + MARGIN_PX
+    x0, y0 = np.maximum(low, 0).astype(int)
+    x1, y1 = np.minimum(high, figure.mask.shape[::-1]).astype(int)
+    window = np.s_[y0:y1, x0:x1]
+    trimmed = replace(
+        figure,
+        rgba=figure.rgba[window],
+        mask=mask[window],
+        joints_px=figure.joints_px - np.array([x0, y0], np.float32),
+        part_labels=np.where(mask[window], figure.part_labels[window], 0),
+    )
+    return trimmed, int(kept.sum()), int((~kept).sum())

@@ -95,7 +95,8 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         excess, nearest = limb.excess(points)
         region = inside & ((owner == index) | (excess < 0))
         region = _with_chain(region, excess)
-        layers.append(Layer(limb.name, region, np.where(region, limb.part_of(nearest), np.uint8(0)), limb))
+        computed = np.where(region, limb.part_of(nearest), np.uint8(0))
+        layers.append(Layer(limb.name, region, _as_given(computed, canvas, owner == index, limb.part), limb))
         # Behind a limb the core goes on: inside the torso, around the root joint, and where it is on both sides.
         root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
         behind = _closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
@@ -103,7 +104,10 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
     # Detached pieces that only a limb claimed but does not reach belong to the core, whatever is left of them.
     completed |= inside & ~np.logical_or.reduce([completed, *(layer.region for layer in layers)])
     core_labels = _core_labels(points, torso, head, merged, garment)
-    core = Layer("core", completed, np.where(completed, core_labels, np.uint8(0)), None)
+    taken = np.concatenate([np.zeros(0, np.uint8), *(limb.part for limb in layered)])
+    own_parts = np.setdiff1d(np.arange(1, PART["hair"], dtype=np.uint8), taken)
+    computed = np.where(completed, core_labels, np.uint8(0))
+    core = Layer("core", completed, _as_given(computed, canvas, owner == 0, own_parts), None)
 
     labels = np.where(completed, core.labels, 0).astype(np.uint8)
     for index, layer in enumerate(layers, start=1):
@@ -196,6 +200,15 @@ def _under_cloth(limb: Limb, twin: Limb, visible: BoolArray) -> NDArray[np.bool_
     return rows < (len(rows) if hem > ankle else hem)
 
 
+def _as_given(
+    computed: NDArray[np.uint8], canvas: Canvas, shown: NDArray[np.bool_], parts: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Part labels of a layer with those that the user gave where the drawing shows it: its own parts and extras."""
+    given = canvas.labels
+    wanted = shown & (computed > 0) & (np.isin(given, parts) | (given >= PART["hair"]))
+    return np.where(wanted, given, computed).astype(np.uint8)
+
+
 def _owners(
     canvas: Canvas, core_excess: NDArray[np.float64], layered: list[Limb], points: NDArray[np.float64]
 ) -> NDArray[np.int64]:
@@ -218,7 +231,8 @@ def _owners(
     given = canvas.labels
     for label in np.unique(given[inside]):
         index = next((i for i, limb in enumerate(layered, start=1) if label in limb.part), 0)
-        if label:
+        # Hair, cloth and held things stay with the layer that the skeleton finds for them.
+        if 0 < label < PART["hair"]:
             owner[inside & (given == label)] = index
     _give_leftovers(owner, np.stack(costs))
     _rejoin_islands(owner, layered, np.stack(costs))

@@ -63,20 +63,15 @@ class Sources:
 def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_size: int, seed: int) -> Sources:
     """The drawing and its plain version for each part of `outline`."""
     seen = _continued(figure.rgba, figure.mask)
-    scale = min(1.0, PLAIN_SHARE * texture_size / max(figure.mask.shape))
-    height, width = (max(1, round(n * scale)) for n in figure.mask.shape)
-    # Both axes by the same factor, so that one number maps pixels.
-    small = np.asarray(
-        Image.fromarray(seen.astype(np.uint8)).resize((width, height), Image.Resampling.BOX), dtype=np.float32
-    )
-    rows, columns = np.mgrid[0:height, 0:width]
-    full_height, full_width = figure.mask.shape
-    centres = np.stack([(columns + 0.5) * full_width / width, (rows + 0.5) * full_height / height], axis=-1)
-    points = frame.figure_from_image(centres)
+    # A whole factor is the same in both directions, so that one number maps pixels.
+    factor = max(1, int(max(figure.mask.shape) / (PLAIN_SHARE * texture_size)))
+    small = np.asarray(Image.fromarray(seen.astype(np.uint8)).reduce(factor), dtype=np.float32)
+    rows, columns = np.mgrid[0 : small.shape[0], 0 : small.shape[1]]
+    points = frame.figure_from_image(np.stack([columns + 0.5, rows + 0.5], axis=-1) * factor)
     where = np.round(outline.canvas.pixels(points)).astype(int)
     labels = _lookup(outline.split.labels, where)
     palette, index = _palette(small, labels > 0, seed)
-    pitch = frame.units_per_px * figure.mask.shape[0] / height
+    pitch = frame.units_per_px * factor
     ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)
 
     plain: dict[int, NDArray[np.float32]] = {}
@@ -92,7 +87,7 @@ def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_si
     if head in plain:
         face, radius = _face(figure, frame, outline, points)
         plain[head] = _without_face(plain[head], labels == head, face, index, palette, ink, 0.5 * radius / pitch)
-    return Sources(seen, plain, height / figure.mask.shape[0])
+    return Sources(seen, plain, 1.0 / factor)
 
 
 def _continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:

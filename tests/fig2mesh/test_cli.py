@@ -108,7 +108,7 @@ def test_faults_of_ours_are_not_the_users(
         raise ZeroDivisionError("planted")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("fig2mesh.parts.outline.inflate", broken)
+    monkeypatch.setattr("fig2mesh.parts.layers.inflate", broken)
     assert main(arguments(files)) == 1
     message = capfd.readouterr().err
     assert "internal error: ZeroDivisionError: planted" in message

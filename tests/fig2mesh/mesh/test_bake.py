@@ -7,7 +7,7 @@ import pytest
 
 from fig2mesh.field.analytic import sample, sphere
 from fig2mesh.field.body import Body
-from fig2mesh.mesh.bake import Baked, bake, rasterise, vertex_colors
+from fig2mesh.mesh.bake import Baked, bake, rasterise
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.mesh.unwrap import unwrap
@@ -98,14 +98,6 @@ def test_padding_repeats_the_nearest_texel(scene: tuple[UvMesh, Body, Baked]) ->
     _, _, baked = scene
     used = {tuple(colour) for colour in baked.color[baked.covered]}
     assert {tuple(colour) for colour in baked.color.reshape(-1, 3)} <= used
-
-
-def test_vertex_colours_come_from_the_atlas(scene: tuple[UvMesh, Body, Baked]) -> None:
-    mesh, _, baked = scene
-    colours = vertex_colors(mesh, baked)
-    nearest = mesh.solid.vertices[mesh.solid_index]
-    tip = nearest[:, 2] > 1.05
-    assert (colours[tip] == RED).all()
 
 
 def test_every_triangle_is_rasterised_once() -> None:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fig2mesh.errors import InputError
 from fig2mesh.field.analytic import mannequin
 from fig2mesh.field.body import Body
 from fig2mesh.mesh.ball_pivot import ball_pivot
@@ -104,7 +105,7 @@ def test_a_missing_plugin_names_the_remedy(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(pymeshlab, "MeshSet", lambda verbose: object())
     torn = Mesh(closed("sphere").vertices, closed("sphere").faces[1:])
-    with pytest.raises(RuntimeError, match="libopengl0"):
+    with pytest.raises(InputError, match="libopengl0"):
         close(torn, SOLIDS["sphere"].field, method="pymeshlab")
 
 
