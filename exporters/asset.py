@@ -21,14 +21,15 @@ IntArray = NDArray[np.int32]
 ByteArray = NDArray[np.uint8]
 
 
-def _frozen(array: Any, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
+def frozen_array(array: Any, dtype: Any, shape: tuple[int | None, ...], name: str, finite: bool = True) -> NDArray[Any]:
+    """A read-only, C-ordered copy of `array`, checked against `shape` (None: any length) and, if asked, for NaN."""
     result = np.array(array, dtype=dtype, order="C", copy=True)
     matches = len(shape) == result.ndim and all(
         want is None or want == have for want, have in zip(shape, result.shape, strict=True)
     )
     if not matches:
         raise ValueError(f"{name}: shape is {result.shape}, expected {shape}")
-    if result.dtype.kind == "f" and not np.isfinite(result).all():
+    if finite and result.dtype.kind == "f" and not np.isfinite(result).all():
         raise ValueError(f"{name}: holds NaN or infinite values")
     result.flags.writeable = False
     return result
@@ -44,7 +45,7 @@ class Texture:
     pixels: ByteArray
 
     def __post_init__(self) -> None:
-        pixels = _frozen(self.pixels, np.uint8, (None, None, None), "pixels")
+        pixels = frozen_array(self.pixels, np.uint8, (None, None, None), "pixels")
         if pixels.shape[2] not in (1, 3, 4):
             raise ValueError(f"pixels: {pixels.shape[2]} channels, expected 1, 3 or 4")
         object.__setattr__(self, "pixels", pixels)
@@ -93,7 +94,7 @@ class TexturedMesh:
         def put(name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:
             value = getattr(self, name)
             if value is not None:
-                object.__setattr__(self, name, _frozen(value, dtype, shape, name))
+                object.__setattr__(self, name, frozen_array(value, dtype, shape, name))
 
         put("vertices", np.float32, (None, 3))
         put("faces", np.int32, (None, 3))

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from exporters.asset import ByteArray, TexturedMesh
 from exporters.sampling import sample
+from fig2mesh.field.camera import axes
 
 Mode = Literal["textured", "clay", "normals", "observed"]
 Bounds = tuple[float, float, float, float]
@@ -37,20 +38,9 @@ MARGIN = 0.04
 """Free border of a picture, share of its height."""
 
 
-def view_axes(yaw_deg: float, pitch_deg: float = 0.0) -> NDArray[np.float64]:
-    """(3, 3) rotation `view_from_asset`; its rows are the view's right, up and towards-the-camera axes in ASSET."""
-    # Exact zeros for quarter turns: faces seen edge-on must not peek out by a rounding error.
-    (sin_yaw, cos_yaw), (sin_pitch, cos_pitch) = (
-        np.round([np.sin(angle), np.cos(angle)], 15) for angle in np.radians([yaw_deg, pitch_deg])
-    )
-    right = np.array([cos_yaw, 0.0, -sin_yaw])
-    toward = np.array([sin_yaw * cos_pitch, sin_pitch, cos_yaw * cos_pitch])
-    return np.stack([right, np.cross(toward, right), toward])
-
-
 def view_bounds(mesh: TexturedMesh, yaw_deg: float, pitch_deg: float = 0.0) -> Bounds:
     """Left, bottom, right, top of the mesh in the plane of a view, metres."""
-    flat = mesh.vertices @ view_axes(yaw_deg, pitch_deg)[:2].T
+    flat = mesh.vertices @ axes(yaw_deg, pitch_deg)[:2].T
     (left, bottom), (right, top) = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
     return left, bottom, right, top
 
@@ -89,8 +79,8 @@ def render_mesh(
     if min(width, height, samples) < 1:
         raise ValueError(f"size and samples are {size} and {samples}, expected at least 1")
     left, bottom, right, top = _fitted(view_bounds(mesh, yaw_deg, pitch_deg), size) if bounds is None else bounds
-    axes = view_axes(yaw_deg, pitch_deg)
-    vertices = mesh.vertices @ axes.T
+    view_from_asset = axes(yaw_deg, pitch_deg)
+    vertices = mesh.vertices @ view_from_asset.T
     # Centred and of unit size, so that single precision serves figures of a millimetre and of a kilometre alike.
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre, unit = (low + high) / 2, max(float((high - low).max()), 1e-30)
@@ -102,7 +92,7 @@ def render_mesh(
     rows = max(1, RAYS_AT_ONCE // (width * samples * samples))
     for first in range(0, height, rows):
         band = y[first * samples : (first + rows) * samples]
-        fine = _shade_rays(scene, mesh, axes, x, band, mode).reshape(-1, samples, width, samples, 4)
+        fine = _shade_rays(scene, mesh, view_from_asset, x, band, mode).reshape(-1, samples, width, samples, 4)
         picture[first : first + rows] = fine.mean(axis=(1, 3), dtype=np.float64)
     coverage = picture[..., 3:]
     if background is not None:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.asset import frozen_array
+
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 ByteArray = NDArray[np.uint8]
@@ -37,26 +39,11 @@ PART: dict[str, int] = {name: index for index, name in enumerate(PART_NAMES)}
 BODY_PARTS: range = range(1, 15)
 
 
-def frozen_array(array: Any, dtype: Any, shape: tuple[int | None, ...], name: str) -> NDArray[Any]:
-    """A read-only, C-ordered copy of `array`, checked against `shape` (None: any length)."""
-    result = np.array(array, dtype=dtype, order="C", copy=True)
-    matches = len(shape) == result.ndim and all(
-        want is None or want == have for want, have in zip(shape, result.shape, strict=True)
-    )
-    if not matches:
-        raise ValueError(f"{name}: shape is {result.shape}, expected {shape}")
-    result.flags.writeable = False
-    return result
-
-
 class _Checked:
     """Mixin: freeze and check array fields in `__post_init__`."""
 
     def _put(self, name: str, dtype: Any, shape: tuple[int | None, ...], finite: bool = True) -> None:
-        value = frozen_array(getattr(self, name), dtype, shape, name)
-        if finite and value.dtype.kind == "f" and not np.isfinite(value).all():
-            raise ValueError(f"{name}: holds NaN or infinite values")
-        object.__setattr__(self, name, value)
+        object.__setattr__(self, name, frozen_array(getattr(self, name), dtype, shape, name, finite))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 
 from exporters.asset import Texture, TexturedMesh
-from fig2mesh.preview import LIGHT, render_mesh, view_axes, view_bounds, views_sheet, write_preview
+from fig2mesh.field.camera import axes
+from fig2mesh.preview import LIGHT, render_mesh, view_bounds, views_sheet, write_preview
 
 FRONT, LEFT, BACK, RIGHT, TOP, BOTTOM = (
     (220, 30, 30), (30, 200, 30), (30, 30, 220), (220, 200, 30), (200, 30, 200), (30, 200, 200),
@@ -85,9 +86,9 @@ def test_right_half_of_a_turned_box_is_its_left(box: TexturedMesh) -> None:
 
 def test_axes_are_a_rotation_for_any_angle() -> None:
     for yaw, pitch in np.random.default_rng(0).uniform(-180, 180, (20, 2)):
-        axes = view_axes(yaw, pitch)
-        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-14)
-        assert np.linalg.det(axes) == pytest.approx(1.0)
+        rotation = axes(yaw, pitch)
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
 def test_coverage_is_the_area_inside_a_pixel(box: TexturedMesh) -> None:
