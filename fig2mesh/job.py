@@ -88,7 +88,7 @@ def run(
 
     from fig2mesh.parts.pieces import clean
 
-    drawn, pieces, specks = clean(drawn, settings.voxel)
+    drawn, pieces, specks = clean(drawn, settings.voxel, 2 * max(settings.texture_size, 1024))
     if specks:
         log.warning("%s: %d specks of the silhouette are too small to model and were left out", figure, specks)
     results: dict[str, Any] = {"figure": drawn, "pieces": pieces}

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from fig2mesh.paper import FIGURE_HEIGHT
 from fig2mesh.records import JOINT, Figure
 
+WIDEST = 3.0
+"""Drawings wider than this many heights are scaled by their width instead: nobody is 30 m long for lying down."""
+
 
 @dataclass(frozen=True)
 class ImageFrame:
@@ -35,7 +38,7 @@ class ImageFrame:
 
 def image_frame(figure: Figure) -> ImageFrame:
     """The frame of a figure: its silhouette is 1.79 units high, its pelvis the origin (paper §4.1)."""
-    rows = np.flatnonzero(figure.mask.any(axis=1))
-    drawn_height_px = rows[-1] - rows[0] + 1
+    rows, columns = np.flatnonzero(figure.mask.any(axis=1)), np.flatnonzero(figure.mask.any(axis=0))
+    drawn_height_px = max(rows[-1] - rows[0] + 1, (columns[-1] - columns[0] + 1) / WIDEST)
     x, y = figure.joints_px[JOINT["pelvis"]].tolist()
     return ImageFrame((x, y), FIGURE_HEIGHT / float(drawn_height_px))

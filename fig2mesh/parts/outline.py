@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.errors import FigureError
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.layers import LayerSurface, raise_layers
@@ -24,6 +25,9 @@ from fig2mesh.records import BODY_PARTS, PART, BoolArray, PartSdf, Pose3D
 
 OVERLAP = 0.025
 """How far neighbouring parts of one layer reach into each other, FIGURE units."""
+
+THIN = 0.75
+"""Largest grid spacing relative to the half thickness of a part."""
 
 LEAST_NODES, MOST_NODES = 64, 192
 """The paper's grids have 64 nodes an edge (§4.2); small parts have fingers and need them more than large ones."""
@@ -57,6 +61,8 @@ def outline_parts(canvas: Canvas, pose: Pose3D, visible: BoolArray, *, voxel: fl
         for label in np.unique(surface.labels[surface.labels > 0])
         if (part := _part_field(canvas, surface, int(label), voxel, divided, device)) is not None
     ]
+    if not parts:
+        raise FigureError("silhouette", "too thin to be a solid", "pass a larger picture, or --quality fine")
     return Outline(tuple(parts), divided, surfaces, canvas)
 
 
@@ -75,6 +81,8 @@ def _part_field(
     rows, columns = np.nonzero(solid)
     half = np.sqrt(surface.u[solid])
     points = canvas.points()
+    # At least one node must fall inside a part, however thin it is drawn.
+    voxel = min(voxel, THIN * float(half.max()))
     pad = 3.0 * voxel + canvas.pitch
     low = np.array([points[0, columns.min(), 0], points[rows.max(), 0, 1], (surface.z0[solid] - half).min()]) - pad
     high = np.array([points[0, columns.max(), 0], points[rows.min(), 0, 1], (surface.z0[solid] + half).max()]) + pad

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from PIL import Image
 from scipy import ndimage
 
 from fig2mesh.parse.frame import image_frame
@@ -16,11 +17,12 @@ SPECK = 3.0
 MARGIN_PX = 4
 
 
-def clean(figure: Figure, voxel: float) -> tuple[Figure, int, int]:
+def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]:
     """The figure without specks that no grid could hold, the number of pieces kept and of specks dropped.
 
     Pieces are 8-connected. The largest one is always kept. The picture is cut down to the silhouette and the joints,
-    so that nothing that follows depends on how much of a sheet lies around the figure.
+    so that nothing that follows depends on how much of a sheet lies around the figure, and reduced to about `most_px`
+    pixels on its longer side: scans have far more than a texture can show.
     """
     pieces, count = ndimage.label(figure.mask, np.ones((3, 3)))
     windows = ndimage.find_objects(pieces)
@@ -43,4 +45,23 @@ def clean(figure: Figure, voxel: float) -> tuple[Figure, int, int]:
         joints_px=figure.joints_px - np.array([x0, y0], np.float32),
         part_labels=np.where(mask[window], figure.part_labels[window], 0),
     )
-    return trimmed, int(kept.sum()), int((~kept).sum())
+    return _reduced(trimmed, max(trimmed.mask.shape) // most_px), int(kept.sum()), int((~kept).sum())
+
+
+def _reduced(figure: Figure, factor: int) -> Figure:
+    """The figure with `factor` pixels a side made one; silhouette and labels by their majority and nearest pixel."""
+    if factor < 2:
+        return figure
+    # With alpha premultiplied, colours of transparent pixels do not bleed into opaque ones.
+    picture = Image.fromarray(figure.rgba).convert("RGBa").reduce(factor).convert("RGBA")
+    cover = np.asarray(Image.fromarray(np.where(figure.mask, np.uint8(255), np.uint8(0))).reduce(factor))
+    mask = cover >= min(128, int(cover.max()))
+    half = factor // 2
+    labels = np.pad(figure.part_labels, ((0, factor), (0, factor)), mode="edge")[half::factor, half::factor]
+    return replace(
+        figure,
+        rgba=np.asarray(picture),
+        mask=mask,
+        joints_px=np.minimum(figure.joints_px / factor, np.array(mask.shape[::-1], np.float32)),
+        part_labels=np.where(mask, labels[: mask.shape[0], : mask.shape[1]], 0),
+    )

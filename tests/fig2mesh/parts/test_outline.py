@@ -135,7 +135,7 @@ def test_specks_are_dropped_and_pieces_counted(figure: Figure) -> None:
     mask[5:7, 5:7] = True
     mask[500:560, 5:40] = True
     dirty = Figure("dirty", figure.rgba, mask, figure.joints_px, figure.visible, figure.part_labels)
-    kept, pieces, specks = clean(dirty, VOXEL)
+    kept, pieces, specks = clean(dirty, VOXEL, 2048)
     assert (pieces, specks) == (2, 1)
     assert kept.mask.sum() == mask.sum() - 4
     shift = figure.joints_px[0] - kept.joints_px[0]
@@ -150,7 +150,7 @@ def test_what_surrounds_the_figure_does_not_matter(figure: Figure) -> None:
     sheet[row : row + height, column : column + width] = figure.rgba
     joints = figure.joints_px + np.float32([column, row])
     large = Figure("sheet", sheet, sheet[..., 3] > 127, joints, figure.visible, np.zeros(sheet.shape[:2], np.uint8))
-    trimmed, small = clean(large, VOXEL)[0], clean(figure, VOXEL)[0]
+    trimmed, small = clean(large, VOXEL, 2048)[0], clean(figure, VOXEL, 2048)[0]
     assert np.array_equal(trimmed.mask, small.mask)
     assert np.array_equal(trimmed.rgba, small.rgba)
     assert np.allclose(trimmed.joints_px, small.joints_px)
@@ -179,8 +179,31 @@ def test_small_pictures_keep_their_limbs(figure: Figure, height: int) -> None:
     rgba = np.asarray(Image.fromarray(figure.rgba).resize(size, Image.Resampling.BOX))
     joints = figure.joints_px * np.float32([size[0] / figure.mask.shape[1], factor])
     small = Figure("small", rgba, rgba[..., 3] > 127, joints, figure.visible, np.zeros(rgba.shape[:2], np.uint8))
-    low, high = Body(infer(clean(small, VOXEL)[0]).parts).bounds()
+    low, high = Body(infer(clean(small, VOXEL, 2048)[0]).parts).bounds()
     rows, columns = np.flatnonzero(small.mask.any(axis=1)), np.flatnonzero(small.mask.any(axis=0))
     pixel = 1.79 / (np.ptp(rows) + 1)
     assert high[1] - low[1] == pytest.approx(1.79, abs=1.0 * pixel)
     assert high[0] - low[0] == pytest.approx((np.ptp(columns) + 1) * pixel, abs=1.5 * pixel)
+
+
+def test_a_large_scan_is_the_same_figure(figure: Figure) -> None:
+    """Eight times as many pixels, reduced on the way in: joints and silhouette stay where they were."""
+    size = (figure.mask.shape[1] * 8, figure.mask.shape[0] * 8)
+    rgba = np.asarray(Image.fromarray(figure.rgba).resize(size, Image.Resampling.NEAREST))
+    large = Figure(
+        "large", rgba, rgba[..., 3] > 127, figure.joints_px * 8, figure.visible, np.zeros(rgba.shape[:2], np.uint8)
+    )
+    reduced, plain = clean(large, VOXEL, 600)[0], clean(figure, VOXEL, 2048)[0]
+    assert max(reduced.mask.shape) < 1200
+    places = [image_frame(f).figure_from_image(f.joints_px) for f in (reduced, plain)]
+    assert np.allclose(*places, atol=0.006), "a pixel of the drawing is 0.003 units"
+
+
+def test_lying_figures_are_no_giants() -> None:
+    """A bar thirty times as wide as high: scaled by its width."""
+    mask = np.zeros((20, 300), bool)
+    mask[5:15, :] = True
+    joints = np.full((21, 2), 10, np.float32)
+    shape = mask.shape
+    bar = Figure("bar", np.zeros((*shape, 4), np.uint8), mask, joints, np.ones(21, bool), np.zeros(shape, np.uint8))
+    assert 300 * image_frame(bar).units_per_px == pytest.approx(3 * 1.79)
