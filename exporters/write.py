@@ -73,16 +73,20 @@ def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: st
     exists although `overwrite` is off, or that is asked for twice.
     """
     seen: set[str] = set()
+    parts: dict[str, Path] = {}
     for path in paths:
         main = _main_file(path)
         _check(path, main, overwrite)
         for companion in _companions(path, name, lods):
             if companion.exists() and not overwrite:
                 raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
+            parts[os.path.abspath(companion)] = main
         key = os.path.abspath(main)
         if key in seen:
             raise ExportError(os.fspath(path), "is asked for twice", "name each output once")
         seen.add(key)
+    for key in seen & set(parts):
+        raise ExportError(key, f"is also a part of {parts[key]}", "choose another name or folder for one of them")
 
 
 def write(

@@ -175,6 +175,12 @@ def main(arguments: list[str] | None = None) -> int:
     except InputError as error:
         click.echo("fig2mesh: " + " ".join(str(error).split()), err=True)
         return 2
+    except OSError as error:
+        # Paths fail in more ways than can be listed: names too long, loops of links, folders that are files.
+        where = str(error.filename or "a file")
+        shown = where if len(where) < 200 else f"{where[:80]}…{where[-80:]}"
+        click.echo(f"fig2mesh: {shown}: {error.strerror or 'cannot be used'}; check the path", err=True)
+        return 2
     except (KeyboardInterrupt, click.Abort):
         click.echo("fig2mesh: interrupted; no output is half-written", err=True)
         return 130

@@ -11,6 +11,7 @@ import dataclasses
 import json
 import os
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -43,10 +44,11 @@ def save_stage(folder: Path, stage: str, value: object) -> None:
     partial = folder / f".{stage}.partial.npz"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), **arrays)
+        np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), __stage__=np.array(stage), **arrays)
         os.replace(partial, target)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
         found = f"{target}: {error.strerror}"
         raise OutputError("--save-stages", found, "choose a folder that can be written") from None
 
@@ -63,6 +65,8 @@ def load_stage(folder: Path, stage: str) -> Any:
     path = folder / f"{stage}.npz"
     try:
         with np.load(path, allow_pickle=False) as archive:
+            if str(archive["__stage__"]) != stage:
+                raise ValueError(f"it holds {archive['__stage__']}")
             return _unpack(json.loads(str(archive["__tree__"])), archive, _classes())
     except FileNotFoundError:
         raise FigureError(path, "no such file", "run once with --save-stages and without --resume-from") from None
