@@ -13,6 +13,8 @@ from typing import Any
 import click
 
 from fig2mesh import __version__
+from fig2mesh.training import cli as training_cli
+from fig2mesh.training import data_cli
 
 FILE = click.Path(path_type=Path)
 
@@ -155,6 +157,10 @@ def doctor() -> None:
         click.echo(f"{'ok  ' if fine else 'FAIL'} {name}: {text}")
     if not healthy:
         raise SystemExit(1)
+
+
+data_cli.add_to(cli)
+training_cli.add_to(cli)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -13,8 +13,9 @@ from fig2mesh.parts.depth import mid_surface, place_limb
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
+from fig2mesh.parts.profile import Profile, column_extents, measure_profile
 from fig2mesh.parts.split import Layer, Split
-from fig2mesh.records import JOINT, PART, PART_NAMES
+from fig2mesh.records import JOINT, PART, PART_NAMES, PartSdf
 
 LOAD = {"torso": 0.95, "head": 3.0, "garment": 1.1, "foot": 2.2, "limb": 2.0}
 """Right-hand side of the inflation by kind of part: 2 makes a strip as deep as wide, 1 about 0.7 times; a torso is
@@ -45,26 +46,32 @@ class LayerSurface:
     labels: NDArray[np.uint8]
 
 
-def raise_layers(canvas: Canvas, divided: Split, joints: NDArray[np.float64], device: str) -> tuple[LayerSurface, ...]:
+def raise_layers(
+    canvas: Canvas,
+    divided: Split,
+    joints: NDArray[np.float64],
+    device: str,
+    fields: tuple[PartSdf, ...] = (),
+) -> tuple[LayerSurface, ...]:
     """The layers of a split figure in depth, the core first.
 
     Parameters
     ----------
     joints : (21, 3) float64, FIGURE
     device : PyTorch device of the inflation
+    fields : what networks made of the parts; the layers take their thickness and their place before or behind the
+        bones from them, and keep the drawn outline
     """
-    in_core = [limb for limb in divided.limbs if all(limb is not layer.limb for layer in divided.layers)]
-    trunk_joints = [
-        JOINT[n] for n in ("neck", "thorax", "pelvis", "l_shoulder", "r_shoulder", "l_hip", "r_hip", "head")
-    ]
-    trunk = np.concatenate([joints[trunk_joints], _between(joints[JOINT["thorax"]], joints[JOINT["pelvis"]])])
-    points = np.concatenate([trunk[:, :2], *(limb.points for limb in in_core)])
-    depth = np.concatenate([trunk[:, 2], *(limb.depth for limb in in_core)])
-    core, *others = divided.layers
     loads = part_loads(joints)
+    core, *others = divided.layers
+    points, depth = _trunk(divided, joints)
+    profiles = {
+        layer.name: _layer_profile(canvas, layer, *bones, loads, device, fields)
+        for layer, bones in [(core, (points, depth)), *((x, (x.limb.points, x.limb.depth)) for x in others if x.limb)]
+    }
     layers: list[Layer] = [core]
     limbs: list[Limb | None] = [None]
-    surfaces = [inflated(canvas, core, mid_surface(canvas, points, depth), loads, device)]
+    surfaces = [inflated(canvas, core, mid_surface(canvas, points, depth), loads, device, profiles)]
     top, bottom = _extent(surfaces[0])
     legs_top, legs_bottom = np.full_like(top, np.nan), np.full_like(bottom, np.nan)
     for layer in sorted(others, key=_drawn_order):
@@ -76,14 +83,47 @@ def raise_layers(canvas: Canvas, divided: Split, joints: NDArray[np.float64], de
             limb = place_limb(layer.limb, canvas, legs_top, legs_bottom)
             if raised.any():
                 limb = place_limb(limb, canvas, top, bottom)
-        surface = inflated(canvas, layer, mid_surface(canvas, limb.points, limb.depth), loads, device)
+        surface = inflated(canvas, layer, mid_surface(canvas, limb.points, limb.depth), loads, device, profiles)
         layers.append(layer)
         limbs.append(limb)
         surfaces.append(surface)
         above, below = _extent(surface)
         if not limb.is_arm:
             legs_top, legs_bottom = np.fmax(legs_top, above), np.fmin(legs_bottom, below)
-    return _joined(canvas, layers, limbs, surfaces, loads, device)
+    return _joined(canvas, layers, limbs, surfaces, loads, device, profiles)
+
+
+def _trunk(divided: Split, joints: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(N, 2) points and (N,) depths of the bones in the core: the trunk, the head and the limbs that lie free of it."""
+    in_core = [limb for limb in divided.limbs if all(limb is not layer.limb for layer in divided.layers)]
+    trunk_joints = [
+        JOINT[n] for n in ("neck", "thorax", "pelvis", "l_shoulder", "r_shoulder", "l_hip", "r_hip", "head")
+    ]
+    trunk = np.concatenate([joints[trunk_joints], _between(joints[JOINT["thorax"]], joints[JOINT["pelvis"]])])
+    points = np.concatenate([trunk[:, :2], *(limb.points for limb in in_core)])
+    return points, np.concatenate([trunk[:, 2], *(limb.depth for limb in in_core)])
+
+
+def _layer_profile(
+    canvas: Canvas,
+    layer: Layer,
+    points: NDArray[np.float64],
+    depth: NDArray[np.float64],
+    loads: NDArray[np.float64],
+    device: str,
+    fields: tuple[PartSdf, ...],
+) -> Profile | None:
+    """What the networks say of a layer; None where they know none of its parts."""
+    own = [field for field in fields if (layer.labels == field.part).any()]
+    if not own:
+        return None
+    front, back = column_extents(canvas, own)
+    seen = np.isfinite(front)
+    _, nearest = ndimage.distance_transform_edt(~layer.region, return_indices=True)
+    whole = replace(layer, region=seen, labels=layer.labels[tuple(nearest)])
+    reference = inflate(seen, _load(canvas, whole, loads), device) * canvas.pitch**2
+    bone = mid_surface(canvas, points, depth)
+    return measure_profile(canvas, layer.region, front, back, reference, bone)
 
 
 def _joined(
@@ -93,6 +133,7 @@ def _joined(
     surfaces: list[LayerSurface],
     loads: NDArray[np.float64],
     device: str,
+    profiles: dict[str, Profile | None],
 ) -> tuple[LayerSurface, ...]:
     """The surfaces with floating limbs brought back towards the middle of the body until they hold."""
     for attempt in range(ATTEMPTS):
@@ -108,7 +149,7 @@ def _joined(
                 # Being at the same depth is not enough for layers that only meet at their rims.
                 layers[index] = _grown(canvas, layers[index])
             z0 = mid_surface(canvas, limb.points, limb.depth)
-            surfaces[index] = inflated(canvas, layers[index], z0, loads, device)
+            surfaces[index] = inflated(canvas, layers[index], z0, loads, device, profiles)
     return tuple(surfaces)
 
 
@@ -147,14 +188,27 @@ def part_loads(joints: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def inflated(
-    canvas: Canvas, layer: Layer, z0: NDArray[np.float64], loads: NDArray[np.float64], device: str
+    canvas: Canvas,
+    layer: Layer,
+    z0: NDArray[np.float64],
+    loads: NDArray[np.float64],
+    device: str,
+    profiles: dict[str, Profile | None],
 ) -> LayerSurface:
+    u = inflate(layer.region, _load(canvas, layer, loads), device) * canvas.pitch**2
+    u = _extended(canvas, layer.region, u)
+    profile = profiles.get(layer.name)
+    if profile is not None:
+        u, z0 = u * profile.ratio, z0 + profile.offset
+    return LayerSurface(u, z0, layer.labels)
+
+
+def _load(canvas: Canvas, layer: Layer, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(H, W) right-hand side of the inflation, without jumps between parts."""
     values = np.where(layer.region, loads[layer.labels], 0.0)
     blur = 0.03 / canvas.pitch
     cover = ndimage.gaussian_filter(layer.region.astype(float), blur)
-    load = ndimage.gaussian_filter(values, blur) / np.maximum(cover, 1e-6)
-    u = inflate(layer.region, load, device) * canvas.pitch**2
-    return LayerSurface(_extended(canvas, layer.region, u), z0, layer.labels)
+    return np.asarray(ndimage.gaussian_filter(values, blur) / np.maximum(cover, 1e-6))
 
 
 def _extended(canvas: Canvas, region: NDArray[np.bool_], u: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ It is the baseline for the networks of paper §4.2 and an oracle for tests: no w
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,7 +44,15 @@ class Outline:
     canvas: Canvas
 
 
-def outline_parts(canvas: Canvas, pose: Pose3D, visible: BoolArray, *, voxel: float, device: str = "cpu") -> Outline:
+def outline_parts(
+    canvas: Canvas,
+    pose: Pose3D,
+    visible: BoolArray,
+    *,
+    voxel: float,
+    device: str = "cpu",
+    infer: Callable[[Canvas, Split], tuple[PartSdf, ...]] | None = None,
+) -> Outline:
     """Part fields of a silhouette.
 
     Parameters
@@ -51,10 +60,12 @@ def outline_parts(canvas: Canvas, pose: Pose3D, visible: BoolArray, *, voxel: fl
     visible : (21,) bool, joints that the drawing shows
     voxel : grid spacing aimed at, FIGURE units; large parts on coarser grids than 192³ asks for get a larger one
     device : PyTorch device of the inflation and the field evaluation
+    infer : what makes the parts' fields that the layers take their cross-sections from; without it the outline is all
     """
     joints = pose.joints.astype(np.float64)
     divided = split(canvas, joints, visible)
-    surfaces = raise_layers(canvas, divided, joints, device)
+    fields = infer(canvas, divided) if infer is not None else ()
+    surfaces = raise_layers(canvas, divided, joints, device, fields)
     parts = [
         part
         for surface in surfaces

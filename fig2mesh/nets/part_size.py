@@ -1,0 +1,120 @@
+"""How large a part is, from its joints and the outline of its mask (paper §4.3: a perceptron of 20, 40, 20 neurons).
+
+A mask has no depth, and a hidden part no mask; the joints between which a part lies tell the rest. Everything goes in
+and comes out in units of the part's own bone, so that a figure twice as large has parts twice as large. Axes are those
+of the view; right parts go in mirrored, as left ones.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from fig2mesh.errors import InputError
+from fig2mesh.nets import weights
+from fig2mesh.parts.kinds import ANCHORS, KINDS, MIRRORED, PART_KIND, anchor_joints, part_centre
+
+NEURONS: Final = (20, 40, 20)
+OUTPUTS: Final = 4
+LEAST_UNIT: Final = 1e-4
+FARTHEST: Final = 4.0
+"""Logarithms of mask to bone beyond this are cut: a bone that points at the viewer may have next to no length."""
+
+
+@dataclass(frozen=True)
+class SizeShape:
+    """kind : which of `KINDS` a network is for."""
+
+    kind: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"kind: {self.kind!r}, expected one of {', '.join(KINDS)}")
+
+
+class PartSizeNet(nn.Module):
+    """The perceptron of one kind."""
+
+    def __init__(self, shape: SizeShape) -> None:
+        super().__init__()
+        self.shape = shape
+        layers: list[nn.Module] = []
+        inputs = 3 * len(ANCHORS[shape.kind]) + 3
+        for width in NEURONS:
+            layers += [nn.Linear(inputs, width), nn.SiLU()]
+            inputs = width
+        self.layers = nn.Sequential(*layers, nn.Linear(inputs, OUTPUTS))
+
+    def forward(self, anchors: Tensor, mask: Tensor) -> Tensor:
+        """(N, 4) logarithms of width, height, depth and cube edge, in the unit of the input.
+
+        anchors : (N, A, 3) relative to the part's centre, view axes, left side; mask : (N, 2) width and height of the
+        part's mask, zeros where it is not seen
+        """
+        unit = bone_unit(anchors)
+        seen = (mask > 0).all(dim=1, keepdim=True)
+        outline = torch.where(seen, (mask.clamp_min(LEAST_UNIT) / unit[:, None]).log().clamp(-FARTHEST, FARTHEST), 0.0)
+        inputs = torch.cat([(anchors / unit[:, None, None]).flatten(1), outline, seen.to(anchors.dtype)], dim=1)
+        sizes: Tensor = self.layers(inputs) + unit.log()[:, None]
+        return sizes
+
+
+def bone_unit(anchors: Tensor) -> Tensor:
+    """(N,) root mean square distance of anchors (N, A, 3) from their mean."""
+    spread = anchors - anchors.mean(dim=1, keepdim=True)
+    return spread.square().sum(dim=2).mean(dim=1).sqrt().clamp_min(LEAST_UNIT)
+
+
+@torch.no_grad()
+def part_size(
+    net: PartSizeNet, part: int, joints: NDArray[np.floating], mask: tuple[float, float] | None = None
+) -> tuple[NDArray[np.float32], float]:
+    """(3,) width, height and depth of a part, and the edge of its PART cube, FIGURE units.
+
+    joints : (21, 3), FIGURE or axes of another view; mask : width and height of the part as drawn, None if it is not
+    """
+    if PART_KIND[part] != net.shape.kind:
+        raise ValueError(f"part {part} is no {net.shape.kind}")
+    anchors = np.asarray(joints, np.float64)[list(anchor_joints(part))] - part_centre(part, joints)
+    if MIRRORED[part]:
+        anchors = anchors * [-1.0, 1.0, 1.0]
+    outline = torch.tensor([mask or (0.0, 0.0)], dtype=torch.float32)
+    net.eval()
+    sizes = net(torch.from_numpy(anchors[None].astype(np.float32)), outline).exp()[0].numpy()
+    return np.asarray(sizes[:3], np.float32), float(sizes[3])
+
+
+def size_path(kind: str, folder: Path = weights.FOLDER) -> Path:
+    """Where the weights of a kind's network are."""
+    return folder / f"size-{kind}.safetensors"
+
+
+def save_size(path: Path, net: PartSizeNet, facts: Mapping[str, Any]) -> None:
+    """Write a size network; its shape is put among the facts."""
+    weights.save(path, net.state_dict(), {**facts, "network": "size", "shape": asdict(net.shape)})
+
+
+def read_size(path: Path) -> tuple[PartSizeNet, dict[str, Any]]:
+    """A size network, ready for inference, and its facts."""
+    state, facts = weights.read(path)
+    try:
+        net = PartSizeNet(SizeShape(**facts["shape"]))
+        net.load_state_dict(state)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        finding = f"not the weights of a size network ({str(error).splitlines()[0]})"
+        raise InputError(path, finding, weights.REINSTALL) from None
+    return net.eval().requires_grad_(False), facts
+
+
+@functools.cache
+def load(kind: str) -> PartSizeNet:
+    """The shipped network of a kind, read once a process."""
+    return read_size(size_path(kind))[0]

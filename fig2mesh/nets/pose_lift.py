@@ -1,0 +1,205 @@
+"""From drawn joints to joints in space: the network of Martinez et al. 2017 as paper §4.1 adapts it.
+
+Linear 1024, then two residual blocks of two linear layers with batch normalisation, ReLU and dropout. For an
+orthographic drawing x and y are kept and only depths are predicted; for a perspective one all three coordinates are.
+The pelvis is the origin. How large a drawn figure would stand is not known, so the input is divided by a scale that its
+own bones tell (`bone_scale`), and the output multiplied by it; `metric` networks trust the units, as the paper does.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from fig2mesh.errors import InputError
+from fig2mesh.nets import weights
+from fig2mesh.parts.kinds import JOINT_MIRROR
+from fig2mesh.records import JOINT, JOINT_NAMES
+
+WIDTH: Final = 1024
+BLOCKS: Final = 2
+DROPOUT: Final = 0.5
+
+ADDED: Final = ("eyes", "l_hand", "r_hand", "l_foot", "r_foot")
+"""The five joints that the paper adds to the sixteen of Martinez et al."""
+
+BONES: Final = tuple(
+    (JOINT[first.replace("*", side)], JOINT[second.replace("*", side)])
+    for first, second in (
+        ("*_shoulder", "*_elbow"), ("*_elbow", "*_wrist"), ("*_hip", "*_knee"), ("*_knee", "*_ankle"),
+        ("pelvis", "thorax"), ("pelvis", "*_shoulder"),
+    )
+    for side in ("lr" if "*" in first + second else "l")
+)  # fmt: skip
+"""Pairs of joints whose drawn distances tell the scale; joints that both networks have."""
+
+QUANTILE: Final = 0.8
+"""Most bones are foreshortened, and some are drawn too long: this quantile of drawn to usual length is the scale."""
+
+LEAST_SCALE: Final = 1e-6
+
+USUAL_LENGTHS: Final = tuple(
+    {"elbow": 0.27, "wrist": 0.25, "knee": 0.41, "ankle": 0.41, "thorax": 0.42, "shoulder": 0.47}[
+        JOINT_NAMES[second].removeprefix("l_").removeprefix("r_")
+    ]
+    for _, second in BONES
+)
+"""Lengths of `BONES` of a figure of 1.79 units, until training measures them."""
+
+
+@dataclass(frozen=True)
+class PoseLiftShape:
+    """What a network takes and gives.
+
+    joints : 21, or the 16 of Martinez et al.
+    perspective : the drawing is one, so x and y are predicted too
+    visibility : whether a joint is seen is an input
+    metric : drawn joints are in FIGURE units of a figure that stands 1.79 tall, instead of any unit
+    width : of the layers
+    """
+
+    joints: int = 21
+    perspective: bool = False
+    visibility: bool = False
+    metric: bool = False
+    width: int = WIDTH
+
+    def __post_init__(self) -> None:
+        if self.joints not in (16, 21):
+            raise ValueError(f"joints: {self.joints}, expected 16 or 21")
+
+    @property
+    def indices(self) -> tuple[int, ...]:
+        """Which of `JOINT_NAMES` the network knows, in its order."""
+        dropped = ADDED if self.joints == 16 else ()
+        return tuple(JOINT[name] for name in JOINT_NAMES if name not in dropped)
+
+
+class _Block(nn.Module):
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.layers = nn.Sequential(*_layer(width, width), *_layer(width, width))
+
+    def forward(self, hidden: Tensor) -> Tensor:
+        added: Tensor = self.layers(hidden)
+        return hidden + added
+
+
+def _layer(inputs: int, outputs: int) -> tuple[nn.Module, ...]:
+    linear = nn.Linear(inputs, outputs)
+    nn.init.kaiming_normal_(linear.weight)
+    return linear, nn.BatchNorm1d(outputs), nn.ReLU(), nn.Dropout(DROPOUT)
+
+
+class PoseLift(nn.Module):
+    """The network of a shape; `bone_length` (len(BONES),) holds the usual length of each bone, FIGURE units."""
+
+    def __init__(self, shape: PoseLiftShape) -> None:
+        super().__init__()
+        self.shape = shape
+        count, width = shape.joints, shape.width
+        self.first = nn.Sequential(*_layer(count * (3 if shape.visibility else 2), width))
+        self.blocks = nn.Sequential(*(_Block(width) for _ in range(BLOCKS)))
+        self.last = nn.Linear(width, count * (3 if shape.perspective else 1))
+        self.register_buffer("bone_length", torch.tensor(USUAL_LENGTHS))
+        self.bone_length: Tensor
+
+    def forward(self, drawn: Tensor, visible: Tensor | None = None) -> Tensor:
+        """(N, J, 3) joints about the pelvis in the unit of `drawn`.
+
+        drawn : (N, J, 2), y up, any origin; visible : (N, J) bool, all where missing
+        """
+        shape = self.shape
+        pelvis = shape.indices.index(JOINT["pelvis"])
+        flat = drawn - drawn[:, pelvis : pelvis + 1]
+        scale = flat.new_ones(len(flat)) if shape.metric else self.scale(flat)
+        inputs = (flat / scale[:, None, None]).flatten(1)
+        if shape.visibility:
+            hidden = torch.zeros_like(flat[..., 0]) if visible is None else 1 - visible.to(flat.dtype)
+            inputs = torch.cat([inputs, hidden], dim=1)
+        raw = self.last(self.blocks(self.first(inputs))).float()
+        result = raw.reshape(len(flat), shape.joints, -1) * scale[:, None, None]
+        result = result - result[:, pelvis : pelvis + 1]
+        return result if shape.perspective else torch.cat([flat, result], dim=2)
+
+    def scale(self, drawn: Tensor) -> Tensor:
+        """(N,) unit of drawn joints (N, J, 2) in FIGURE units of a figure of usual limbs."""
+        indices = self.shape.indices
+        first = [indices.index(a) for a, _ in BONES]
+        second = [indices.index(b) for _, b in BONES]
+        ratios = (drawn[:, first] - drawn[:, second]).norm(dim=2) / self.bone_length
+        return torch.quantile(ratios.float(), QUANTILE, dim=1).clamp_min(LEAST_SCALE)
+
+
+def bone_lengths(joints: Tensor) -> Tensor:
+    """(len(BONES),) mean lengths of `BONES` over joints (N, 21, 3)."""
+    return torch.stack([(joints[:, a] - joints[:, b]).norm(dim=1).mean() for a, b in BONES])
+
+
+@torch.no_grad()
+def lift(net: PoseLift, drawn: Tensor, visible: Tensor | None = None) -> Tensor:
+    """(N, J, 3) as the network gives it, averaged with the mirror image of what it gives for the mirror image."""
+    indices = net.shape.indices
+    twin = [indices.index(JOINT_MIRROR[index]) for index in indices]
+    flip = drawn.new_tensor([-1.0, 1.0, 1.0])
+    net.eval()
+    plain = net(drawn, visible)
+    seen = None if visible is None else visible[:, twin]
+    mirrored = net(drawn[:, twin] * flip[:2], seen)[:, twin] * flip
+    both: Tensor = (plain + mirrored) / 2
+    return both
+
+
+def lift_joints(
+    net: PoseLift, joints_2d: NDArray[np.floating], visible: NDArray[np.bool_] | None = None
+) -> NDArray[np.float32]:
+    """(21, 3) float32, FIGURE: the drawn joints, x and y exactly, with depths; the pelvis has depth 0.
+
+    joints_2d : (21, 2), FIGURE; visible : (21,) bool
+    """
+    if net.shape.joints != len(JOINT_NAMES) or net.shape.perspective:
+        raise ValueError("drawn figures need the orthographic network of 21 joints")
+    drawn = torch.from_numpy(np.array(joints_2d, np.float32)[None])
+    seen = None if visible is None else torch.from_numpy(np.array(visible, np.bool_)[None])
+    depth = lift(net, drawn, seen)[0, :, 2].numpy()
+    return np.column_stack([np.asarray(joints_2d, np.float32), depth]).astype(np.float32)
+
+
+def pose_path(shape: PoseLiftShape, folder: Path = weights.FOLDER) -> Path:
+    """Where the weights of a pose network are."""
+    marks = [name for name in ("perspective", "visibility", "metric") if getattr(shape, name)]
+    return folder / f"{'-'.join(['pose', str(shape.joints), *marks])}.safetensors"
+
+
+def save_pose(path: Path, net: PoseLift, facts: Mapping[str, Any]) -> None:
+    """Write a pose network; its shape is put among the facts.
+
+    Half precision shifts a depth by less than 0.1 mm, the statistics of batch normalisation included (tested).
+    """
+    weights.save(path, net.state_dict(), {**facts, "network": "pose", "shape": asdict(net.shape)})
+
+
+def read_pose(path: Path) -> tuple[PoseLift, dict[str, Any]]:
+    """A pose network, ready for inference, and its facts."""
+    state, facts = weights.read(path)
+    try:
+        net = PoseLift(PoseLiftShape(**facts["shape"]))
+        net.load_state_dict(state)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        finding = f"not the weights of a pose network ({str(error).splitlines()[0]})"
+        raise InputError(path, finding, weights.REINSTALL) from None
+    return net.eval().requires_grad_(False), facts
+
+
+@functools.cache
+def load(visibility: bool = False) -> PoseLift:
+    """The shipped network for drawn figures, read once a process."""
+    return read_pose(pose_path(PoseLiftShape(visibility=visibility)))[0]

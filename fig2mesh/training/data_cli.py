@@ -1,0 +1,73 @@
+"""`fig2mesh data`: make and look at training data; nothing heavy is imported before a command runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+
+
+@click.group()
+def data() -> None:
+    """Make training data: a pack of bodies and poses first, then samples from it."""
+
+
+@data.command()
+@click.option("--assets", type=FOLDER, metavar="DIR", help="Clips, clothes and characters; docs/training.md says which.")
+@click.option("--poses", type=click.IntRange(10, 100_000), default=3000, show_default=True, metavar="N")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
+@click.option("-o", "--output", "out", type=FILE, required=True, metavar="FILE", help="An .npz file.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing pack.")
+def pack(assets: Path | None, poses: int, seed: int, out: Path, overwrite: bool) -> None:
+    """Bodies, garments and poses in one file, from which samples need only NumPy and torch."""
+    from fig2mesh.errors import InputError, OutputError
+    from fig2mesh.training.pack import build_pack, save_pack
+
+    if assets is not None and not assets.is_dir():
+        raise InputError("--assets", f"no folder {assets}", "name the folder that holds the assets, or leave it out")
+    if out.exists() and not overwrite:
+        raise OutputError(out, "exists", "pass --overwrite or another file")
+    made = build_pack(assets, seed, poses)
+    save_pack(made, out)
+    click.echo(
+        f"{out}: {len(made.training_poses.clip)} poses and {len(made.held_out_poses.clip)} held out, "
+        f"{len(made.garments)} garments, {len(made.characters)} characters",
+        err=True,
+    )
+
+
+@data.command()
+@click.option("--pack", type=FILE, required=True, metavar="FILE", help="What `data pack` made.")
+@click.option("-o", "--output", "out", type=FOLDER, required=True, metavar="DIR", help="Shards; an unfinished one goes on.")
+@click.option("--bodies", type=click.IntRange(1), default=2000, show_default=True, metavar="N", help="To train on.")
+@click.option("--valid", type=click.IntRange(0), default=48, show_default=True, metavar="N", help="Of each held-out split.")
+@click.option("--pictures/--no-pictures", default=True, show_default=True, help="Drawn pictures, labels, depth, UV.")
+@click.option("--seed", type=click.IntRange(0, 2000), default=0, show_default=True)
+@click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, metavar="N")
+def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, seed: int, jobs: int) -> None:
+    """Samples from a pack: parts, distances, masks, joints and pictures from four sides."""
+    from fig2mesh.training.build import build as run
+
+    run(
+        pack, out, bodies=bodies, valid=valid, seed=seed, jobs=jobs, pictures=pictures,
+        report=lambda done, total: click.echo(f"{done} of {total} shards", err=True),
+    )  # fmt: skip
+
+
+@data.command()
+@click.argument("source", type=click.Path(path_type=Path), metavar="DATA")
+@click.option("-o", "--output", "out", type=FILE, required=True, metavar="PNG")
+@click.option("--count", type=click.IntRange(1, 200), default=24, show_default=True, metavar="N", help="Bodies shown.")
+def show(source: Path, out: Path, count: int) -> None:
+    """A contact sheet of samples."""
+    from fig2mesh.training.sheet import make_sheet
+
+    make_sheet(source, out, count)
+
+
+def add_to(cli: click.Group) -> None:
+    """Make `data` a command of `cli`."""
+    cli.add_command(data)
