@@ -11,7 +11,7 @@ SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 li
 PACKAGES = {
     "numpy": "numpy", "scipy": "scipy", "numba": "numba", "torch": "torch", "open3d": "open3d-cpu",
     "pymeshlab": "pymeshlab", "fast_simplification": "fast-simplification", "xatlas": "xatlas", "trimesh": "trimesh",
-    "pxr": "usd-core", "pyproj": "pyproj", "skimage": "scikit-image",
+    "pxr": "usd-core", "pyproj": "pyproj", "skimage": "scikit-image", "safetensors": "safetensors",
 }  # fmt: skip
 
 
@@ -27,6 +27,7 @@ def examine() -> Iterator[tuple[str, bool, str]]:
             continue
         yield distribution, True, version(distribution)
     yield _filters()
+    yield _weights()
     yield _gpu()
 
 
@@ -39,6 +40,23 @@ def _filters() -> tuple[str, bool, str]:
     except ImportError:
         usable = False
     return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
+
+
+def _weights() -> tuple[str, bool, str]:
+    try:
+        from fig2mesh.nets import part_size, pose_lift, weights
+        from fig2mesh.parts.kinds import KINDS
+        from fig2mesh.parts.network import VARIANTS
+
+        pose_lift.load()
+        for kind in KINDS:
+            part_size.load(kind)
+            for variant in VARIANTS.values():
+                weights.load(kind, variant)
+    except Exception as error:
+        return "weights", False, " ".join(str(error).split())[:200]
+    megabytes = sum(path.stat().st_size for path in weights.FOLDER.glob("*.safetensors")) / 1e6
+    return "weights", True, f"{megabytes:.0f} MB"
 
 
 def _gpu() -> tuple[str, bool, str]:

@@ -22,8 +22,10 @@ from fig2mesh.mesh.solid import Solid, make_solid
 from fig2mesh.mesh.unwrap import unwrap
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
+from fig2mesh.parts.network import VARIANTS, part_inference
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.placing import asset_from_figure
+from fig2mesh.pose.network import lift_by_network
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import ByteArray, Figure, Mesh, PointCloud, Pose3D, UvMesh
 from fig2mesh.settings import Settings
@@ -52,11 +54,15 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
     """The verbs that a request needs, in order. The first takes the result "figure", the last makes "model"."""
 
     def lift_pose(figure: Figure) -> Pose3D:
-        return lift(figure, image_frame(figure))
+        road = lift if settings.parts == "outline" else lift_by_network
+        return road(figure, image_frame(figure))
 
     def infer_parts(figure: Figure, pose: Pose3D) -> Outline:
         canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, 0.9 * settings.voxel)
-        return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device)
+        infer = None
+        if settings.parts != "outline":
+            infer = part_inference(VARIANTS[settings.parts], pose, settings.device)
+        return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device, infer=infer)
 
     def assemble(outline: Outline) -> Body:
         return Body(outline.parts)

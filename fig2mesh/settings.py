@@ -8,6 +8,7 @@ from typing import Literal
 Quality = Literal["draft", "standard", "fine"]
 Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
+Parts = Literal["network", "paper", "outline"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Settings:
     lods : number of meshes, the finest included; each has a quarter of the triangles of the one before
     mesher : how the surface becomes a mesh
     closing : what closes the holes that ball pivoting leaves
-    parts : where part fields come from
+    parts : what depths come from: our networks, the paper's, or rules and the outline alone
     device : "cpu" or "cuda"
     seed : of everything random
     """
@@ -35,7 +36,7 @@ class Settings:
     lods: int = 1
     mesher: Mesher = "ball-pivot"
     closing: Closing = "pymeshlab"
-    parts: Literal["outline"] = "outline"
+    parts: Parts = "network"
     device: str = "cpu"
     seed: int = 0
 
@@ -44,7 +45,7 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "bake
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
 FIRST_USE = {
-    "canvas_px": "parts", "voxel": "parts", "parts": "parts", "spacing": "cloud", "seed": "cloud", "mesher": "solid",
+    "parts": "lift", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud", "mesher": "solid",
     "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
 }  # fmt: skip
 """Setting → the first stage that it changes."""

@@ -182,7 +182,7 @@ def pose_path(shape: PoseLiftShape, folder: Path = weights.FOLDER) -> Path:
 def save_pose(path: Path, net: PoseLift, facts: Mapping[str, Any]) -> None:
     """Write a pose network; its shape is put among the facts.
 
-    Half precision shifts a depth by less than 0.1 mm, the statistics of batch normalisation included (tested).
+    Half precision moves depths by less than 0.2 % of the deepest, batch normalisation included (tested).
     """
     weights.save(path, net.state_dict(), {**facts, "network": "pose", "shape": asdict(net.shape)})
 

@@ -33,6 +33,8 @@ def save(path: Path, state: Mapping[str, Tensor], facts: Mapping[str, Any]) -> N
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     save_file(halves, part, {KEY: json.dumps(dict(facts), sort_keys=True)})
+    # safetensors writes for the owner alone; package data is for everybody.
+    part.chmod(0o644)
     os.replace(part, path)
 
 

@@ -13,15 +13,16 @@ from fig2mesh.field.distance import grid_distance
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.kinds import anchor_joints
-from fig2mesh.records import BODY_PARTS, JOINT_NAMES, Figure
+from fig2mesh.records import BODY_PARTS, JOINT_NAMES, Figure, PartSdf
+from fig2mesh.training.pack import Pack
 from fig2mesh.training.samples import scene
 from fig2mesh.training.sdf import signed_distance
-from fig2mesh.training.subject import Subject
+from fig2mesh.training.subject import Subject, draw_subject
 
 PICTURE = 512
 """Pixels of the drawing's edge."""
 
-SAMPLES = 20_000
+SAMPLES = 8_000
 """Points a surface from which the chamfer distance is measured."""
 
 TRUNK = {"head": (2,), "eyes": (2,), "neck": (1, 2), "thorax": (1,), "pelvis": (1,)}
@@ -112,6 +113,50 @@ def part_ious(parts: Any, truth: Truth, shift: float, nodes: int = 40) -> dict[i
             made |= grid_distance(part, grid - [0.0, 0.0, shift]) < 0
         union = (there | made).sum()
         result[label] = float((there & made).sum() / union) if union else 1.0
+    return result
+
+
+@dataclass(frozen=True)
+class Measured:
+    """chamfer : FIGURE units; ious : by part label."""
+
+    chamfer: float
+    ious: dict[int, float]
+
+
+ROADS = ("outline", "paper's networks", "networks", "plain union of the networks' parts")
+"""What is compared: the drawn outline and rules alone; the two sets of networks down the same road; and the networks'
+parts put together as they are (paper §4.3)."""
+
+
+def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
+    """One held-out figure down every road."""
+    from fig2mesh.parts.canvas import make_canvas
+    from fig2mesh.parts.network import VARIANTS, part_inference
+    from fig2mesh.parts.outline import outline_parts
+    from fig2mesh.parts.split import split as divide
+    from fig2mesh.pose.network import lift_by_network
+    from fig2mesh.pose.prior import lift
+    from fig2mesh.settings import settings_for
+
+    settings = settings_for("draft")
+    truth = truth_of(draw_subject(pack, split, seed))
+    frame = image_frame(truth.figure)
+    canvas = make_canvas(truth.figure, frame, settings.canvas_px, 0.9 * settings.voxel)
+    made: dict[str, tuple[PartSdf, ...]] = {}
+    for road, variant in zip(ROADS, (None, "paper", "network", None), strict=False):
+        pose = lift(truth.figure, frame) if variant is None else lift_by_network(truth.figure, frame)
+        if road == ROADS[3]:
+            pose = lift_by_network(truth.figure, frame)
+            divided = divide(canvas, pose.joints.astype(np.float64), truth.figure.visible)
+            made[road] = part_inference(VARIANTS["network"], pose)(canvas, divided)
+            continue
+        infer = None if variant is None else part_inference(VARIANTS[variant], pose)
+        made[road] = outline_parts(canvas, pose, truth.figure.visible, voxel=settings.voxel, infer=infer).parts
+    result = {}
+    for road, parts in made.items():
+        distance, shift = chamfer(Body(parts), truth)
+        result[road] = Measured(distance, part_ious(parts, truth, shift))
     return result
 
 

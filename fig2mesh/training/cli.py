@@ -63,7 +63,7 @@ def train() -> None:
 @click.option("--visibility", is_flag=True, help="Which joints are hidden is an input.")
 @click.option("--metric", is_flag=True, help="Trust the drawing's units, as the paper does.")
 @click.option("--plain", is_flag=True, help="Bodies as they are, from all around: the paper's protocol.")
-@click.option("--batch", type=click.IntRange(2), default=256, show_default=True, metavar="N")
+@click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N")
 def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, **given: Any) -> None:
     """Depths of joints (table 1)."""
     from fig2mesh.nets.pose_lift import PoseLiftShape

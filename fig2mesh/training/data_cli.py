@@ -68,6 +68,35 @@ def show(source: Path, out: Path, count: int) -> None:
     make_sheet(source, out, count)
 
 
+@click.command()
+@click.option("--pack", type=FILE, required=True, metavar="FILE", help="What `data pack` made.")
+@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help="What `data build` made.")
+@click.option("--runs", type=FOLDER, metavar="DIR", help="What `train` made: networks that are not shipped.")
+@click.option("--bodies", type=click.IntRange(1), default=32, show_default=True, metavar="N", help="Dense fields.")
+@click.option("--figures", type=click.IntRange(1), default=12, show_default=True, metavar="N", help="Whole drawings.")
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def evaluate(
+    pack: Path, source: Path, runs: Path | None, bodies: int, figures: int, out: Path | None, overwrite: bool
+) -> None:
+    """The paper's tables beside ours, on clips and people that training never saw."""
+    from fig2mesh.errors import OutputError
+    from fig2mesh.training.evaluate import Limits
+    from fig2mesh.training.evaluate import evaluate as measure
+    from fig2mesh.training.pack import load_pack
+
+    if out is not None and out.exists() and not overwrite:
+        raise OutputError(out, "exists", "pass --overwrite or another file")
+    report = measure(load_pack(pack), source, runs, Limits(bodies, figures), lambda line: click.echo(line, err=True))
+    if out is None:
+        click.echo(report, nl=False)
+        return
+    partial = out.with_name(f".{out.name}.partial")
+    partial.write_text(report, encoding="utf-8")
+    partial.replace(out)
+
+
 def add_to(cli: click.Group) -> None:
-    """Make `data` a command of `cli`."""
+    """Make `data` and `evaluate` commands of `cli`."""
     cli.add_command(data)
+    cli.add_command(evaluate)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.paper import FIGURE_HEIGHT
-from fig2mesh.records import JOINT, PART
+from fig2mesh.records import JOINT
 from fig2mesh.training.anny_body import AnnyBodies, rest_directions
 from fig2mesh.training.caricature import caricature, draw_proportions
 from fig2mesh.training.garments import Garment, wear
-from fig2mesh.training.pack import Character, Pack, held_out
+from fig2mesh.training.pack import Pack, held_out
 from fig2mesh.training.partition import PartTopology, partition
 from fig2mesh.training.rig import Posture, Rig, axis_angle, posture
 

@@ -27,7 +27,7 @@ from fig2mesh.training.part_data import MIRROR, VIEWS, PartData, load_parts, swa
 
 MASK_MIX: Final = (0.45, 0.45, 0.10)
 """Shares of whole, visible and empty masks."""
-JITTER: Final = 0.05
+JITTER: Final = 0.02
 """Most standard deviation of joints, PART units, for bone variants; each sample draws its own up to this."""
 NEAR: Final = 0.05
 """Distance at which a point counts half as much as on the surface, PART units, for bone variants."""
@@ -44,14 +44,14 @@ def train_parts(
     budget_min: float | None = None,
     epochs: int | None = None,
     batch: int = 16,
-    points: int = 1024,
+    points: int = 384,
     lr: float = 2e-3,
     seed: int = 0,
     device: str = "cpu",
     mask_mix: tuple[float, float, float] = MASK_MIX,
     max_bodies: int | None = None,
     jitter: float | None = None,
-    validation_bodies: int = 40,
+    validation_bodies: int = 16,
     ema: float = 0.999,
 ) -> dict[str, float]:
     """Train one network on the shards in `data`, going on where an earlier call stopped; returns its scores.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from fig2mesh.training.pack import Pack
     from fig2mesh.training.rig import Rig
 
-BATCH: Final = 256
+BATCH: Final = 512
 RATE: Final = 1e-3
 COUNT: Final = 4096
 """Samples that a score is the mean of."""
@@ -53,7 +53,7 @@ def train_pose(
     batch: int = BATCH,
     rate: float = RATE,
     device: str = "cpu",
-    amp: bool | None = None,
+    amp: bool = True,
 ) -> tuple[PoseLift, dict[str, float]]:
     """The trained network and its scores on held-out poses and bodies; writes all that training leaves.
 

@@ -99,14 +99,16 @@ def mask_extent(packed: NDArray[np.uint8]) -> NDArray[np.float64]:
     return np.stack(result, axis=1)
 
 
-class _Columns(NamedTuple):
+class Columns(NamedTuple):
+    """`PartSizes` as tensors."""
+
     anchors: Tensor
     size: Tensor
     whole: Tensor
     seen: Tensor
 
     @classmethod
-    def of(cls, sizes: PartSizes, device: str) -> _Columns:
+    def of(cls, sizes: PartSizes, device: str) -> Columns:
         arrays = (sizes.anchors, sizes.size, sizes.whole, sizes.seen)
         return cls(*(torch.tensor(array, device=device) for array in arrays))
 
@@ -124,8 +126,8 @@ def train_size(
     device: str = "cpu",
 ) -> tuple[PartSizeNet, dict[str, float]]:
     """The trained network of a kind and its scores on the held-out splits; writes all that training leaves."""
-    known = _Columns.of(read_sizes(data, "train", kind), device)
-    held = {split: _Columns.of(read_sizes(data, split, kind), device) for split in ("valid-clips", "valid-characters")}
+    known = Columns.of(read_sizes(data, "train", kind), device)
+    held = {split: Columns.of(read_sizes(data, split, kind), device) for split in ("valid-clips", "valid-characters")}
     net = seeded(seed, lambda: PartSizeNet(SizeShape(kind))).to(device)
     # The middle of the data, so that training starts at sizes and not at bones.
     offset = (known.size / bone_unit(known.anchors)[:, None]).log().median(dim=0).values
@@ -164,7 +166,7 @@ def train_size(
     return net, scores
 
 
-def _augmented(known: _Columns, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def _augmented(known: Columns, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Anchors, mask, size, and which samples' cube edges still hold.
 
     A body stretched along the axes of the view has boxes and masks stretched alike; the edge of a cube is only known
@@ -185,7 +187,7 @@ def _augmented(known: _Columns, count: int, generator: torch.Generator) -> tuple
 
 
 @torch.no_grad()
-def size_scores(net: PartSizeNet, columns: _Columns) -> dict[str, float]:
+def size_scores(net: PartSizeNet, columns: Columns) -> dict[str, float]:
     """Mean relative errors in percent, as the module's docstring says."""
     net.eval()
     masks = {"whole": columns.whole, "seen": columns.seen, "none": torch.zeros_like(columns.whole)}

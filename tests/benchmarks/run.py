@@ -25,7 +25,7 @@ TURNTABLE = tuple(range(0, 360, 30))
 def measure() -> dict[str, dict[str, Any]]:
     """All benchmarks of this version."""
     with tempfile.TemporaryDirectory() as folder:
-        return {**whole_figures(Path(folder)), **tracing(), **levels(Path(folder))}
+        return {**whole_figures(Path(folder)), **tracing(), **levels(Path(folder)), **decoding()}
 
 
 def arguments(target: Path, *more: str) -> list[str]:
@@ -114,6 +114,38 @@ def levels(folder: Path) -> dict[str, dict[str, Any]]:
     main(arguments(folder / "lod.glb", "--triangles", "5000", "--report", str(report)))
     mean = json.loads(report.read_text())["lods"][0]["mean_deviation_m"]
     return {"lod5k_mean_mm": _value(1000 * mean, "mm", "5,000 triangles against the full mesh, 1.79 m figure")}
+
+
+def decoding() -> dict[str, dict[str, Any]]:
+    """The 14 part fields of the farmer, coarse to fine and, a few parts only, node by node."""
+    from fig2mesh.nets import weights
+    from fig2mesh.nets.decode import decode_counted, decode_dense
+    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.parse.read import read_figure
+    from fig2mesh.parts.canvas import make_canvas
+    from fig2mesh.parts.kinds import PART_KIND
+    from fig2mesh.parts.network import VARIANTS, network_inputs, shipped_sizes
+    from fig2mesh.parts.split import split
+    from fig2mesh.pose.network import lift_by_network
+
+    figure = read_figure(FIGURE / "image.png", keypoints=FIGURE / "keypoints.json")
+    frame = image_frame(figure)
+    canvas = make_canvas(figure, frame, 448)
+    joints = lift_by_network(figure, frame).joints.astype(np.float64)
+    inputs = network_inputs(canvas, split(canvas, joints, figure.visible), joints, shipped_sizes())
+    found = {}
+    for name, variant in VARIANTS.items():
+        nets = {kind: weights.load(kind, variant) for kind in set(PART_KIND.values())}
+        work = [(nets[PART_KIND[part]], given.mask, given.anchors) for part, given in inputs.items()]
+        counts = [decode_counted(*part).evaluated for part in work]
+        fast = statistics.median(_seconds(lambda work=work: [decode_counted(*part) for part in work]) for _ in range(3))
+        dense = _seconds(lambda work=work: [decode_dense(*part) for part in work])
+        share = 100 * sum(counts) / (len(counts) * 64**3)
+        suffix = "" if name == "network" else f"_{name}"
+        how = f"14 parts at 64³, {variant}: {share:.0f} % of the nodes asked for; median of 3"
+        found[f"decode{suffix}_s"] = _value(fast, "s", how)
+        found[f"decode_dense{suffix}_s"] = _value(dense, "s", f"14 parts at 64³, {variant}: every node; once")
+    return found
 
 
 def _seconds(job: Callable[[], Any]) -> float:

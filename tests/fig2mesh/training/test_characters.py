@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from fig2mesh.errors import InputError
 from fig2mesh.mesh.topology import check_solid, face_components
 from fig2mesh.records import BODY_PARTS, JOINT, PART, Mesh
-from fig2mesh.training.characters import BONES, HEIGHT, Winding, one_region_each, read_character, solidify
+from fig2mesh.training.characters import BONES, HEIGHT, one_region_each, read_character
 from fig2mesh.training.rig import KEY, KEYS, T_POSE, Rig, bone_rotations, pose
+from fig2mesh.training.solidify import Winding, solidify
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "quaternius_modular_cc0"
 

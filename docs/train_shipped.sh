@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# Train everything that ships, and what tables 1 and 2 need besides: two lanes at once, one core each.
+#   docs/train_shipped.sh PACK DATA RUNS
+# Run again after an interruption: what is done is done, what was cut off goes on.
+set -euo pipefail
+PACK=$1 DATA=$2 RUNS=$3
+export OMP_NUM_THREADS=1
+TRAIN="${FIG2MESH:-.venv/bin/fig2mesh} train"
+mkdir -p "$RUNS"
+
+ours() {
+  for kind in hand torso head lower_arm foot upper_arm upper_leg lower_leg; do
+    $TRAIN parts --data "$DATA" --kind "$kind" --variant bone --budget 5.5 -o "$RUNS"
+  done
+  variants one-stream one-stream-pose
+}
+
+papers() {
+  paper hand
+  $TRAIN pose --data "$PACK" --budget 8 -o "$RUNS/pose-21"
+  $TRAIN size --data "$DATA" --budget 0.4 -o "$RUNS"
+  for kind in torso head lower_arm foot upper_arm upper_leg lower_leg; do paper $kind; done
+  for joints in 21 16; do
+    $TRAIN pose --data "$PACK" --joints $joints --metric --plain --budget 2 -o "$RUNS/table1/pose-$joints"
+    $TRAIN pose --data "$PACK" --joints $joints --metric --plain --perspective --budget 2 \
+      -o "$RUNS/table1/pose-$joints-perspective"
+  done
+  variants two-stream two-stream-pose
+}
+
+paper() {
+  $TRAIN parts --data "$DATA" --kind "$1" --variant two-stream-pose --budget 4 -o "$RUNS"
+}
+
+variants() {
+  for seed in 1 2 3; do
+    for variant in "$@"; do
+      $TRAIN parts --data "$DATA" --kind hand --variant "$variant" --budget 1.75 --seed $seed -o "$RUNS/table2/$seed"
+    done
+  done
+}
+
+ours > "$RUNS/ours.log" 2>&1 &
+papers > "$RUNS/papers.log" 2>&1 &
+wait -n && wait -n

@@ -1,0 +1,164 @@
+"""Part fields from the networks (paper §4.2): masks and 3D joints in, signed distances out.
+
+Each part gets its 64 x 64 mask, cut out of the drawing in the square of its PART cube, and its anchor joints. The size
+of the cube follows from both (§4.3). A part that the drawing hides has an empty mask: its shape comes from the pose
+alone, its size from its twin where that is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.kinds import KINDS, PART_KIND, anchor_joints, part_centre
+from fig2mesh.parts.split import Split
+from fig2mesh.records import BODY_PARTS, BoolArray, FloatArray, PartSdf, Pose3D
+
+if TYPE_CHECKING:
+    from fig2mesh.nets.disn import Disn
+    from fig2mesh.nets.part_size import PartSizeNet
+
+VARIANTS = {"network": "bone", "paper": "two-stream-pose"}
+"""`--parts` → variant of the networks (`fig2mesh.nets.disn.VARIANTS`)."""
+
+MASK = 64
+NODES = 64
+
+LEAST_PIXELS = 6
+"""Parts of which the drawing shows less count as hidden."""
+
+ROOM = 1.04
+"""A cube is at least this much larger than what is drawn of its part."""
+
+LEAST_EDGE = 0.03
+
+
+def network_parts(
+    canvas: Canvas,
+    divided: Split,
+    joints: NDArray[np.float64],
+    nets: Mapping[str, Disn],
+    sizes: Mapping[str, PartSizeNet],
+) -> tuple[PartSdf, ...]:
+    """The fields of all 14 parts on grids of 64 nodes an edge, FIGURE, in the order of their labels.
+
+    joints : (21, 3) FIGURE
+    nets, sizes : networks by kind
+    """
+    from fig2mesh.nets.decode import decode_many
+
+    inputs = network_inputs(canvas, divided, joints, sizes)
+    grids = decode_many(nets, {part: (given.mask, given.anchors) for part, given in inputs.items()}, NODES)
+    return tuple(
+        PartSdf(
+            part, grids[part] * np.float32(given.edge / 2), given.centre.astype(np.float32), given.edge,
+            bool(given.mask.any()),
+        )
+        for part, given in inputs.items()
+    )  # fmt: skip
+
+
+class PartInput(NamedTuple):
+    """What a network is asked: mask (64, 64) bool; anchors (A, 3) PART; centre (3,) and edge of the cube, FIGURE."""
+
+    mask: BoolArray
+    anchors: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    edge: float
+
+
+def network_inputs(
+    canvas: Canvas, divided: Split, joints: NDArray[np.float64], sizes: Mapping[str, PartSizeNet]
+) -> dict[int, PartInput]:
+    """By label what each part's network is asked."""
+    regions = {part: part_region(divided, part) for part in BODY_PARTS}
+    return {
+        part: PartInput(
+            part_mask(canvas, regions[part], centre, edge),
+            2.0 * (joints[list(anchor_joints(part))] - centre) / edge,
+            centre,
+            edge,
+        )
+        for part, (centre, edge) in part_cubes(canvas, regions, joints, sizes).items()
+    }
+
+
+def part_region(divided: Split, part: int) -> BoolArray:
+    """(H, W) bool: where a part is, also behind others as far as its layer's outline was completed."""
+    region = np.zeros(divided.labels.shape, bool)
+    for layer in divided.layers:
+        region |= layer.labels == part
+    return region if region.sum() >= LEAST_PIXELS else np.zeros_like(region)
+
+
+def part_cubes(
+    canvas: Canvas, regions: Mapping[int, BoolArray], joints: NDArray[np.float64], sizes: Mapping[str, PartSizeNet]
+) -> dict[int, tuple[NDArray[np.float64], float]]:
+    """Centre (3,) and edge of each part's PART cube, FIGURE."""
+    from fig2mesh.nets.part_size import part_size
+
+    points = canvas.points()
+    result = {}
+    for part, region in regions.items():
+        centre = part_centre(part, joints)
+        own = points[region]
+        drawn = None if not len(own) else tuple((np.ptp(own, axis=0) + canvas.pitch).tolist())
+        _, edge = part_size(sizes[PART_KIND[part]], part, joints, drawn)
+        if len(own):
+            edge = max(edge, 2.0 * ROOM * float(np.abs(own - centre[:2]).max() + canvas.pitch))
+        result[part] = (centre, max(edge, LEAST_EDGE))
+    for part, region in regions.items():
+        twin = next((p for p in BODY_PARTS if PART_KIND[p] == PART_KIND[part] and p != part), None)
+        if not region.any() and twin is not None and regions[twin].any():
+            result[part] = (result[part][0], result[twin][1])
+    return result
+
+
+def part_mask(canvas: Canvas, region: BoolArray, centre: NDArray[np.float64], edge: float) -> BoolArray:
+    """(64, 64) bool: a region in the square of a PART cube; row 0 at y = +1, column 0 at x = -1."""
+    if not region.any():
+        return np.zeros((MASK, MASK), bool)
+    step = (np.arange(MASK) + 0.5) / MASK * 2.0 - 1.0
+    x, y = np.meshgrid(centre[0] + edge / 2 * step, centre[1] - edge / 2 * step)
+    where = np.moveaxis(canvas.pixels(np.stack([x, y], axis=-1)), -1, 0)
+    # Pixels of the square may be larger than the canvas's: average before sampling, or strokes are lost.
+    blur = 0.5 * (edge / MASK) / canvas.pitch
+    image = ndimage.gaussian_filter(region.astype(np.float32), 0.5 * blur) if blur > 1.0 else region.astype(np.float32)
+    return np.asarray(ndimage.map_coordinates(image, where, order=1, mode="constant") > 0.5)
+
+
+def part_inference(variant: str, pose: Pose3D, device: str = "cpu") -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
+    """`network_parts` with the networks that come with the package, loaded once a process."""
+    from fig2mesh.nets import weights
+
+    nets = {kind: weights.load(kind, variant).to(device) for kind in KINDS}
+    sizes = shipped_sizes()
+    joints = pose.joints.astype(np.float64)
+    return lambda canvas, divided: network_parts(canvas, divided, joints, nets, sizes)
+
+
+def shipped_sizes() -> dict[str, PartSizeNet]:
+    """The size networks that come with the package, by kind, loaded once a process."""
+    from fig2mesh.nets import part_size
+
+    return {kind: part_size.load(kind) for kind in KINDS}
+
+
+def hidden_parts(fields: tuple[PartSdf, ...], canvas: Canvas) -> tuple[PartSdf, ...]:
+    """Parts that the drawing hides, cut off at the drawn outline: what does not show may not stick out."""
+    result = []
+    for field in fields:
+        if field.observed or not (field.grid < 0).any():
+            continue
+        axis = np.linspace(0.0, field.edge, field.grid.shape[0])
+        x, y = np.meshgrid(field.origin[0] + axis, field.origin[1] + axis, indexing="ij")
+        outline = canvas.sample(canvas.sdf, np.stack([x, y], axis=-1))
+        grid: FloatArray = np.maximum(field.grid, (outline + canvas.pitch)[..., None]).astype(np.float32)
+        if (grid < 0).any():
+            result.append(PartSdf(field.part, grid, field.centre, field.edge, False))
+    return tuple(result)
