@@ -8,18 +8,15 @@ export OMP_NUM_THREADS=1
 TRAIN="${FIG2MESH:-.venv/bin/fig2mesh} train"
 mkdir -p "$RUNS"
 
-ours() {
-  for kind in hand torso head lower_arm foot upper_arm upper_leg lower_leg; do
-    $TRAIN parts --data "$DATA" --kind "$kind" --variant bone --budget 5.5 -o "$RUNS"
-  done
+first() {
+  $TRAIN pose --data "$PACK" --budget 8 -o "$RUNS/pose-21"
+  $TRAIN size --data "$DATA" --budget 0.4 -o "$RUNS"
+  part upper_arm upper_leg lower_leg foot
   variants one-stream one-stream-pose
 }
 
-papers() {
-  paper hand
-  $TRAIN pose --data "$PACK" --budget 8 -o "$RUNS/pose-21"
-  $TRAIN size --data "$DATA" --budget 0.4 -o "$RUNS"
-  for kind in torso head lower_arm foot upper_arm upper_leg lower_leg; do paper $kind; done
+second() {
+  part hand torso head lower_arm
   for joints in 21 16; do
     $TRAIN pose --data "$PACK" --joints $joints --metric --plain --budget 2 -o "$RUNS/table1/pose-$joints"
     $TRAIN pose --data "$PACK" --joints $joints --metric --plain --perspective --budget 2 \
@@ -28,8 +25,10 @@ papers() {
   variants two-stream two-stream-pose
 }
 
-paper() {
-  $TRAIN parts --data "$DATA" --kind "$1" --variant two-stream-pose --budget 4 -o "$RUNS"
+part() {
+  for kind in "$@"; do
+    $TRAIN parts --data "$DATA" --kind "$kind" --budget 9 -o "$RUNS"
+  done
 }
 
 variants() {
@@ -40,6 +39,6 @@ variants() {
   done
 }
 
-ours > "$RUNS/ours.log" 2>&1 &
-papers > "$RUNS/papers.log" 2>&1 &
+first > "$RUNS/first.log" 2>&1 &
+second > "$RUNS/second.log" 2>&1 &
 wait -n && wait -n

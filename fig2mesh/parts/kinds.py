@@ -48,4 +48,4 @@ def part_centre(part: int, joints: NDArray[np.floating]) -> NDArray[np.float64]:
     joints : (..., 21, 3), any frame with the axes of FIGURE
     """
     chosen = [JOINT["head"]] if PART_KIND[part] == "head" else list(anchor_joints(part))
-    return np.asarray(joints, np.float64)[..., chosen, :].mean(axis=-2)
+    return np.asarray(np.asarray(joints, np.float64)[..., chosen, :].mean(axis=-2))

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.field.distance import grid_distance
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.kinds import KINDS, PART_KIND, anchor_joints, part_centre
 from fig2mesh.parts.split import Split
-from fig2mesh.records import BODY_PARTS, BoolArray, FloatArray, PartSdf, Pose3D
+from fig2mesh.records import BODY_PARTS, PART, BoolArray, FloatArray, PartSdf, Pose3D
 
 if TYPE_CHECKING:
     from fig2mesh.nets.disn import Disn
@@ -36,6 +37,12 @@ ROOM = 1.04
 """A cube is at least this much larger than what is drawn of its part."""
 
 LEAST_EDGE = 0.03
+
+MOST_CLOTH = 0.3
+"""Hidden parts with a larger share of their picture under cloth are left out."""
+
+LEAST_CONTACT = 8
+"""Nodes of a hidden part that must lie inside another: fewer would hold it by a thread."""
 
 
 def network_parts(
@@ -149,16 +156,41 @@ def shipped_sizes() -> dict[str, PartSizeNet]:
     return {kind: part_size.load(kind) for kind in KINDS}
 
 
-def hidden_parts(fields: tuple[PartSdf, ...], canvas: Canvas) -> tuple[PartSdf, ...]:
-    """Parts that the drawing hides, cut off at the drawn outline: what does not show may not stick out."""
-    result = []
+def hidden_parts(
+    fields: tuple[PartSdf, ...], shown: tuple[PartSdf, ...], canvas: Canvas, divided: Split
+) -> tuple[PartSdf, ...]:
+    """Parts that the drawing hides, as the pose alone has them; those that cannot be there are left out.
+
+    They are cut off at the drawn outline, for what does not show may not stick out of it. Under cloth there is nothing
+    to be seen of them. What would float, without touching what is shown, is left out too.
+
+    fields : what the networks made; shown : the parts of the drawing
+    """
+    under_cloth = divided.garment | (divided.labels >= PART["hair"])
+    waiting = []
     for field in fields:
-        if field.observed or not (field.grid < 0).any():
+        if field.observed or any(part.part == field.part for part in shown):
             continue
         axis = np.linspace(0.0, field.edge, field.grid.shape[0])
-        x, y = np.meshgrid(field.origin[0] + axis, field.origin[1] + axis, indexing="ij")
-        outline = canvas.sample(canvas.sdf, np.stack([x, y], axis=-1))
+        columns = np.stack(np.meshgrid(field.origin[0] + axis, field.origin[1] + axis, indexing="ij"), axis=-1)
+        outline = canvas.sample(canvas.sdf, columns)
         grid: FloatArray = np.maximum(field.grid, (outline + canvas.pitch)[..., None]).astype(np.float32)
-        if (grid < 0).any():
-            result.append(PartSdf(field.part, grid, field.centre, field.edge, False))
-    return tuple(result)
+        there = (grid < 0).any(axis=2)
+        if not there.any() or canvas.sample(under_cloth.astype(np.float64), columns[there]).mean() > MOST_CLOTH:
+            continue
+        waiting.append(PartSdf(field.part, grid, field.centre, field.edge, False))
+    held: list[PartSdf] = []
+    while True:
+        # Parts hang on each other: a hidden hand is held by a hidden forearm.
+        touching = [part for part in waiting if _touches(part, (*shown, *held))]
+        if not touching:
+            return tuple(held)
+        held += touching
+        waiting = [part for part in waiting if all(part is not other for other in touching)]
+
+
+def _touches(part: PartSdf, others: tuple[PartSdf, ...]) -> bool:
+    """Whether some nodes of a part lie well inside another."""
+    nodes = np.argwhere(part.grid < 0)
+    points = part.origin + part.spacing * nodes.astype(np.float64)
+    return any((grid_distance(other, points) < -part.spacing).sum() > LEAST_CONTACT for other in others)

@@ -21,6 +21,7 @@ from fig2mesh.errors import FigureError
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.layers import LayerSurface, raise_layers
+from fig2mesh.parts.network import hidden_parts
 from fig2mesh.parts.split import Split, split
 from fig2mesh.records import BODY_PARTS, PART, BoolArray, PartSdf, Pose3D
 
@@ -74,7 +75,7 @@ def outline_parts(
     ]
     if not parts:
         raise FigureError("silhouette", "too thin to be a solid", "pass a larger picture, or --quality fine")
-    return Outline(tuple(parts), divided, surfaces, canvas)
+    return Outline((*parts, *hidden_parts(fields, tuple(parts), canvas, divided)), divided, surfaces, canvas)
 
 
 def _part_field(

@@ -77,7 +77,7 @@ def _columns(field: PartSdf) -> tuple[NDArray[np.float64], NDArray[np.float64], 
         there = np.take_along_axis(grid, beyond[..., None], axis=2)[..., 0]
         share = np.where(there > 0, here / np.minimum(here - there, -1e-12), 0.0)
         ends.append(field.origin[2] + field.spacing * (index + step * share))
-    return ends[0], ends[1], inside
+    return ends[0], ends[1], np.asarray(inside)
 
 
 def _window(where: NDArray[np.float64], nodes: int) -> tuple[slice, slice] | None:

@@ -112,7 +112,8 @@ def read_anny(seed: int = 0) -> AnnyBodies:
 
     rng = np.random.default_rng(seed)
     labels = list(model.phenotype_labels)
-    rows = np.stack([measure(dict(zip(labels, rng.uniform(0, 1, len(labels)), strict=True))) for _ in range(SAMPLED_SHAPES)])
+    drawn = (dict(zip(labels, rng.uniform(0, 1, len(labels)), strict=True)) for _ in range(SAMPLED_SHAPES))
+    rows = np.stack([measure(phenotype) for phenotype in drawn])
     mean = rows.mean(axis=0)
     _, values, axes = np.linalg.svd((rows - mean).reshape(len(rows), -1), full_matrices=False)
     # The full body is only needed as a mean; its share of the principal axes does no harm.
@@ -144,7 +145,7 @@ def read_anny(seed: int = 0) -> AnnyBodies:
         rig=rig,
         shapes=shapes[:, :split],
         skirt=hem,
-        skirt_faces=skirt_inverse.reshape(-1, 3),
+        skirt_faces=skirt_inverse.reshape(-1, 3).astype(np.int32),
         skirt_shapes=shapes[:, split:end],
         skirt_index=index[skirt_used],
         skirt_weight=weight[skirt_used],
@@ -185,7 +186,7 @@ def face_parts(
     np.add.at(share, (np.arange(len(bone_index))[:, None], bone_part[bone_index]), bone_weight)
     corner = share.argmax(axis=1)[faces]
     agreed = np.where(corner[:, 1] == corner[:, 2], corner[:, 1], corner[:, 0])
-    return agreed.astype(np.uint8)
+    return np.asarray(agreed, np.uint8)
 
 
 def _y_up(tensor: object) -> NDArray[np.float64]:
@@ -246,9 +247,7 @@ def _joint_bones(key_bone: NDArray[np.int32]) -> NDArray[np.int32]:
     return np.array([key_bone[KEYS.index(key)] for key in keys], np.int32)
 
 
-def _finger_axes(
-    names: list[str], heads: NDArray[np.float32], key_bone: NDArray[np.int32]
-) -> NDArray[np.float32]:
+def _finger_axes(names: list[str], heads: NDArray[np.float32], key_bone: NDArray[np.int32]) -> NDArray[np.float32]:
     axes = np.zeros((len(names), 3))
     for s in "LR":
         wrist = heads[key_bone[KEYS.index(f"{s.lower()}_hand")]]
@@ -301,7 +300,7 @@ def _pieces(faces: NDArray[np.integer]) -> NDArray[np.integer]:
 
 def _largest_piece(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     label = _pieces(faces)
-    return faces[label == np.bincount(label).argmax()]
+    return np.asarray(faces[label == np.bincount(label).argmax()])
 
 
 def _in_piece(faces: NDArray[np.int64], piece: NDArray[np.int64]) -> NDArray[np.bool_]:

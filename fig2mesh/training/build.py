@@ -6,6 +6,7 @@ import hashlib
 import json
 import multiprocessing
 import os
+import zipfile
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
@@ -100,7 +101,7 @@ def _complete(path: Path, rows: int) -> bool:
     try:
         with np.load(path, allow_pickle=False) as archive:
             return len(archive["seed"]) == rows
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return False
 
 
@@ -122,5 +123,6 @@ def _shard(pack: str, split: str, rows: range, seed: int, pictures: bool, path: 
         for name, value in arrays.items():
             columns.setdefault(name, []).append(value)
     partial = path.with_name(f".{path.stem}.partial.npz")
-    np.savez_compressed(partial, **{name: np.asarray(values) for name, values in columns.items()})
+    stacked: dict[str, Any] = {name: np.asarray(values) for name, values in columns.items()}
+    np.savez_compressed(partial, **stacked)
     os.replace(partial, path)

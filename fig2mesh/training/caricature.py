@@ -56,8 +56,8 @@ def caricature(rig: Rig, change: Proportions) -> tuple[Rig, Posture]:
     joints = np.einsum("jik,jk->ji", stretch[rig.joint_bone], rig.joint_rest) + bones.shifts[rig.joint_bone]
     changed = replace(
         rig,
-        vertices=bones.skin(rig.vertices, rig.bone_index, rig.bone_weight),
-        heads=moved,
+        vertices=bones.skin(rig.vertices, rig.bone_index, rig.bone_weight).astype(np.float32),
+        heads=moved.astype(np.float32),
         joint_rest=joints,
         rest_direction=rest_directions(moved, rig.key_bone),
     )

@@ -101,7 +101,7 @@ def size(
 @train.command()
 @common("Folder of shards.")
 @kinds
-@click.option("--variant", type=click.Choice(VARIANTS), default="bone", show_default=True)
+@click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True)
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Times that each part is seen in each view.")
 def parts(
     data: Path, out: Path, budget: float | None, epochs: int | None, device: str, chosen: tuple[str, ...],

@@ -16,7 +16,7 @@ def data() -> None:
 
 
 @data.command()
-@click.option("--assets", type=FOLDER, metavar="DIR", help="Clips, clothes and characters; docs/training.md says which.")
+@click.option("--assets", type=FOLDER, metavar="DIR", help="Clips, clothes, characters; see docs/training.md.")
 @click.option("--poses", type=click.IntRange(10, 100_000), default=3000, show_default=True, metavar="N")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
 @click.option("-o", "--output", "out", type=FILE, required=True, metavar="FILE", help="An .npz file.")
@@ -41,9 +41,13 @@ def pack(assets: Path | None, poses: int, seed: int, out: Path, overwrite: bool)
 
 @data.command()
 @click.option("--pack", type=FILE, required=True, metavar="FILE", help="What `data pack` made.")
-@click.option("-o", "--output", "out", type=FOLDER, required=True, metavar="DIR", help="Shards; an unfinished one goes on.")
+@click.option(
+    "-o", "--output", "out", type=FOLDER, required=True, metavar="DIR", help="Of shards; goes on with what is there."
+)
 @click.option("--bodies", type=click.IntRange(1), default=2000, show_default=True, metavar="N", help="To train on.")
-@click.option("--valid", type=click.IntRange(0), default=48, show_default=True, metavar="N", help="Of each held-out split.")
+@click.option(
+    "--valid", type=click.IntRange(0), default=48, show_default=True, metavar="N", help="Each held-out split."
+)
 @click.option("--pictures/--no-pictures", default=True, show_default=True, help="Drawn pictures, labels, depth, UV.")
 @click.option("--seed", type=click.IntRange(0, 2000), default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, metavar="N")

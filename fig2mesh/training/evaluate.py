@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fig2mesh.nets import part_size, weights
-from fig2mesh.nets.disn import VARIANTS, Disn, DisnShape
-from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, lift_joints, pose_path, read_pose
+from fig2mesh.nets.disn import Disn, DisnShape
+from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, pose_path, read_pose
 from fig2mesh.paper import PART_IOU, PART_RMSE, POSE_SCORES, VARIANT_SCORES
 from fig2mesh.parts.kinds import KINDS, PART_KIND
 from fig2mesh.records import BODY_PARTS
@@ -35,7 +34,7 @@ class Limits:
     figures: int = 12
 
 
-def evaluate(pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(), say: Say = lambda line: None) -> str:  # noqa: B008
+def evaluate(pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(), say: Say = lambda line: None) -> str:
     """The report as Markdown.
 
     data : shards; runs : folder of trained runs besides the shipped weights, searched for networks of tables 1 and 2

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,12 +124,13 @@ def _as_offsets(
 
     bare = bodies.rig.vertices.astype(np.float64)
     body_faces = bodies.rig.faces
-    scene = o3d.t.geometry.RaycastingScene()
+    scene: Any = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(surface.astype(np.float32), faces.astype(np.uint32))
     part = _vertex_parts(bodies)
     allowed = {
         "cloth": ~np.isin(part, [PART["head"], PART["l_hand"], PART["r_hand"]]), "hair": part == PART["head"],
-        "hat": part == PART["head"], "shoe": np.isin(part, [PART[f"{s}_{p}"] for s in "lr" for p in ("foot", "lower_leg")]),
+        "hat": part == PART["head"],
+        "shoe": np.isin(part, [PART[f"{s}_{p}"] for s in "lr" for p in ("foot", "lower_leg")]),
     }[kind]  # fmt: skip
     vertices = bare
     if kind in ("hair", "hat"):
@@ -148,9 +150,10 @@ def _as_offsets(
     along = np.where(covered, np.maximum(distance, 0.002), 0.0)
     along = _smooth(along, body_faces, covered, 6)
     if inwards:
-        moved = _smooth_points(np.where(covered[:, None], vertices + along[:, None] * normal, bare), body_faces, covered, 4)
-        return Garment(name, kind, moved - bare, covered)
-    return Garment(name, kind, np.stack([along, 0 * along, 0 * along], axis=1), covered)
+        lifted = np.where(covered[:, None], vertices + along[:, None] * normal, bare)
+        moved = _smooth_points(lifted, body_faces, covered, 4)
+        return Garment(name, kind, (moved - bare).astype(np.float32), covered)
+    return Garment(name, kind, _along(along), covered)
 
 
 def _shoe(
@@ -162,7 +165,7 @@ def _shoe(
     vertices = bodies.rig.vertices.astype(np.float64)
     foot = np.isin(_vertex_parts(bodies), [PART["l_foot"], PART["r_foot"]])
     covered = covered | (foot & (vertices[:, 1] < 0.10))
-    scene = o3d.t.geometry.RaycastingScene()
+    scene: Any = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(surface.astype(np.float32), faces.astype(np.uint32))
     moved = vertices.copy()
     for _ in range(6):
@@ -170,7 +173,7 @@ def _shoe(
         nearest = scene.compute_closest_points(moved[covered].astype(np.float32))["points"].numpy()
         moved[covered] = nearest
     moved = _smooth_points(moved, bodies.rig.faces, covered, 3)
-    return Garment(name, "shoe", moved - vertices, covered)
+    return Garment(name, "shoe", (moved - vertices).astype(np.float32), covered)
 
 
 def _made(bodies: AnnyBodies) -> tuple[Garment, ...]:
@@ -191,14 +194,20 @@ def _made(bodies: AnnyBodies) -> tuple[Garment, ...]:
     garments = []
     for name, (covered, thickness) in made.items():
         along = _smooth(np.where(covered, thickness, 0.0), bodies.rig.faces, covered, 5)
-        garments.append(Garment(name, "cloth", np.stack([along, 0 * along, 0 * along], axis=1), covered))
+        garments.append(Garment(name, "cloth", _along(along), covered))
     skull = (part == PART["head"]) & ~_face_region(bodies) & (vertices[:, 1] > 1.56)
     round_head = _smooth_points(vertices.astype(np.float64), bodies.rig.faces, skull, 40)
     normal = vertex_normals(round_head, bodies.rig.faces)
     for name, thickness in (("made-short-hair", 0.018), ("made-thick-hair", 0.045)):
         along = _smooth(np.where(skull, thickness, 0.0), bodies.rig.faces, skull, 8)
-        garments.append(Garment(name, "hair", round_head + along[:, None] * normal - vertices, skull))
+        offset = round_head + along[:, None] * normal - vertices
+        garments.append(Garment(name, "hair", offset.astype(np.float32), skull))
     return tuple(garments)
+
+
+def _along(thickness: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(V, 3) the offset of a cloth, from its thickness along the normals."""
+    return np.stack([thickness, 0 * thickness, 0 * thickness], axis=1).astype(np.float32)
 
 
 def _face_region(bodies: AnnyBodies) -> NDArray[np.bool_]:

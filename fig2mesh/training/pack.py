@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,9 @@ from fig2mesh.training.rig import PoseSet, Rig
 HELD_OUT_SHARE = 0.22
 """Share of characters and of outfits that training never sees."""
 
-HALF = ("vertices", "shapes", "skirt", "skirt_shapes", "uv", "offset", "bone_weight", "skirt_weight", "rotations", "curl")
+HALF = (
+    "vertices", "shapes", "skirt", "skirt_shapes", "uv", "offset", "bone_weight", "skirt_weight", "rotations", "curl",
+)  # fmt: skip
 """Fields that are kept in half precision: half a millimetre on a body."""
 
 
@@ -99,8 +102,9 @@ def load_pack(path: Path) -> Pack:
         )
     except FileNotFoundError:
         raise FigureError(path, "no such file", "make it with: fig2mesh data pack -o FILE") from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FigureError(path, f"not a pack of this version ({error})", "make it anew with: fig2mesh data pack") from None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        finding = f"not a pack of this version ({error})"
+        raise FigureError(path, finding, "make it anew with: fig2mesh data pack") from None
 
 
 def _store(arrays: dict[str, Any], prefix: str, record: Any) -> None:

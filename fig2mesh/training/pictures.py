@@ -101,4 +101,3 @@ def _face(joints: NDArray[np.float64], corner: NDArray[np.float64], pitch: float
         both = [max(both, key=lambda eye: float(eye[2]))]
     mouth = eyes - MOUTH_BELOW * reach * up
     return Face(np.array([pixel(eye) for eye in both]), pixel(mouth), float(forward[0]))
-

@@ -24,9 +24,7 @@ KEYS: tuple[str, ...] = (
 
 KEY: dict[str, int] = {name: index for index, name in enumerate(KEYS)}
 
-KEY_MIRROR: tuple[int, ...] = tuple(
-    KEY[{"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]] for name in KEYS
-)
+KEY_MIRROR: tuple[int, ...] = tuple(KEY[{"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]] for name in KEYS)
 """Index of the same key on the other side."""
 
 KEY_PARENT: dict[str, str] = {
@@ -82,7 +80,8 @@ class Rig(_Checked):
     rest_direction : (20, 3) float32, BODY, unit direction of each limb at rest, zero where `T_POSE` is zero
     finger_axis : (B, 3) float32, unit axis about which a finger bone curls (right-handed, positive closes the hand);
         zero for bones that are no fingers
-    joint_bone : (21,) int32; joint_rest : (21, 3) float32, BODY: where each of `JOINT_NAMES` sits at rest, and on which bone
+    joint_bone : (21,) int32, the bone on which each of `JOINT_NAMES` sits
+    joint_rest : (21, 3) float32, BODY, where it sits at rest
     """
 
     name: str

@@ -51,7 +51,7 @@ def geometry(subject: Subject, rng: np.random.Generator, *, grids: bool = False)
             grid[row] = _dense(local, faces)
         amodal[:, row] = _amodal(local, subject.rig.faces[subject.rig.face_part == part.part], part, faces)
     visible = _visible(subject, centre, edge)
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "joints": subject.joints.astype(np.float32),
         "centre": centre.astype(np.float32),
         "edge": edge.astype(np.float32),
@@ -106,13 +106,32 @@ def _amodal(
     _, inverse = np.unique(part.faces, return_inverse=True)
     lookup = np.full(int(part.faces.max()) + 1, -1)
     lookup[part.faces.ravel()] = inverse.ravel()
-    seen = [
-        coverage(vertices @ VIEWS[k].T, lookup[own], size=MASK, low=(-1.0, -1.0), pitch=2.0 / MASK) for k in (0, 1)
-    ]
+    seen = [coverage(vertices @ VIEWS[k].T, lookup[own], size=MASK, low=(-1.0, -1.0), pitch=2.0 / MASK) for k in (0, 1)]
+    # Own faces are an open tube: along its axis one looks through it, where a drawing shows what is behind as a part too.
+    seen = [filled(mask) for mask in seen]
     return np.stack([seen[0], seen[1], seen[0][:, ::-1], seen[1][:, ::-1]])
 
 
-def scene(subject: Subject, view: int, size: int = SCENE) -> tuple[Raster, NDArray[np.uint8], NDArray[np.float64], float]:
+def filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H, W) bool: a mask without holes; what cannot be reached from the border by sides of pixels is inside."""
+    outside = np.zeros(tuple(length + 2 for length in mask.shape), bool)
+    outside[0] = outside[-1] = outside[:, 0] = outside[:, -1] = True
+    free = np.pad(~mask, 1, constant_values=True)
+    while True:
+        grown = outside.copy()
+        grown[1:] |= outside[:-1]
+        grown[:-1] |= outside[1:]
+        grown[:, 1:] |= outside[:, :-1]
+        grown[:, :-1] |= outside[:, 1:]
+        grown &= free
+        if (grown == outside).all():
+            return ~outside[1:-1, 1:-1]
+        outside = grown
+
+
+def scene(
+    subject: Subject, view: int, size: int = SCENE
+) -> tuple[Raster, NDArray[np.uint8], NDArray[np.float64], float]:
     """What is seen from one side: the raster of body and skirt, part labels, lower left corner and pixel's edge."""
     body = subject.vertices @ VIEWS[view].T
     skirt = subject.skirt_vertices @ VIEWS[view].T

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import torch
 
 CHUNK = 4_000_000
 """Pairs of point and triangle that the torch way holds at once."""
@@ -17,7 +22,7 @@ def signed_distance(
         import open3d as o3d
     except ImportError:
         return signed_distance_torch(vertices, faces, points)
-    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene: Any = o3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.uint32))
     query = np.ascontiguousarray(points, np.float32)
     # Three rays vote on the sign: one alone errs once in millions of points.
@@ -33,14 +38,16 @@ def signed_distance_torch(
     corner = torch.as_tensor(np.asarray(vertices, np.float32)[faces], device=device)
     where = torch.as_tensor(np.asarray(points, np.float32), device=device)
     result = []
-    for block in where.split(max(1, CHUNK // len(corner))):
+    step = max(1, CHUNK // len(corner))
+    for first in range(0, len(where), step):
+        block = where[first : first + step]
         a, b, c = (corner[None, :, k] - block[:, None] for k in range(3))
         result.append(torch.where(_winding(a, b, c) > 0.5, -1.0, 1.0) * _distance(a, b, c))
     return np.asarray(torch.cat(result).cpu().numpy(), np.float32)
 
 
-def _winding(a, b, c):  # type: ignore[no-untyped-def]
-    """(P,) winding number from triangle corners relative to the points, (P, F, 3) each (van Oosterom, Strackee 1983)."""
+def _winding(a: torch.Tensor, b: torch.Tensor, c: torch.Tensor) -> torch.Tensor:
+    """(P,) winding number from triangle corners relative to points, (P, F, 3) each (van Oosterom and Strackee 1983)."""
     import torch
 
     la, lb, lc = (v.norm(dim=-1) for v in (a, b, c))
@@ -49,7 +56,7 @@ def _winding(a, b, c):  # type: ignore[no-untyped-def]
     return torch.atan2(top, bottom).double().sum(-1) / (2.0 * torch.pi)
 
 
-def _distance(a, b, c):  # type: ignore[no-untyped-def]
+def _distance(a: torch.Tensor, b: torch.Tensor, c: torch.Tensor) -> torch.Tensor:
     """(P,) distance of the origin to the nearest triangle: the plane where it projects inside, else an edge."""
     import torch
 

@@ -49,7 +49,7 @@ class Subject:
 
 
 def draw_subject(pack: Pack, split: str, seed: int) -> Subject:
-    """The subject number `seed` of a split: "train", "valid-clips" (unseen clips) or "valid-characters" (unseen people)."""
+    """The subject number `seed` of a split: "train", "valid-clips" (unseen) or "valid-characters" (unseen people)."""
     if split not in SPLITS:
         raise ValueError(f"split: {split!r}, expected one of {', '.join(SPLITS)}")
     rng = np.random.default_rng([SPLITS.index(split), seed])
@@ -84,7 +84,7 @@ def draw_subject(pack: Pack, split: str, seed: int) -> Subject:
         vertices=placed(bones.skin(rig.vertices, rig.bone_index, rig.bone_weight)),
         joints=placed(joints),
         parts=_parts(rig),
-        skirt_vertices=_posed_skirt(pack.anny, skirt, bones, placed) if skirt is not None else np.zeros((0, 3)),
+        skirt_vertices=np.zeros((0, 3)) if skirt is None else placed(_posed_skirt(pack.anny, skirt, bones)),
         skirt_faces=pack.anny.skirt_faces if skirt is not None else np.zeros((0, 3), np.int32),
         character=name,
         clip=str(poses.clip[row]),
@@ -93,8 +93,8 @@ def draw_subject(pack: Pack, split: str, seed: int) -> Subject:
     )
 
 
-def _posed_skirt(anny: AnnyBodies, skirt, bones: Posture, placed):  # type: ignore[no-untyped-def]
-    return placed(bones.skin(skirt, anny.skirt_index, anny.skirt_weight))
+def _posed_skirt(anny: AnnyBodies, skirt: NDArray[np.float64], bones: Posture) -> NDArray[np.float64]:
+    return bones.skin(skirt, anny.skirt_index, anny.skirt_weight)
 
 
 def _dressed(pack: Pack, unseen: bool, rng: np.random.Generator) -> tuple[Rig, NDArray[np.float64] | None, str]:
@@ -125,7 +125,7 @@ def _dressed(pack: Pack, unseen: bool, rng: np.random.Generator) -> tuple[Rig, N
         for suffix, chosen in pieces:
             material[faces & chosen] = len(materials)
             materials.append(f"cloth.{garment.name}.{suffix}" if garment.kind == "cloth" else garment.kind)
-    rig = replace(rig, vertices=vertices, face_material=material, materials=tuple(materials))
+    rig = replace(rig, vertices=vertices.astype(np.float32), face_material=material, materials=tuple(materials))
     skirt = None
     if rng.random() < 0.18:
         skirt = anny.skirt + np.tensordot(amount, anny.skirt_shapes, axes=1)
@@ -155,5 +155,3 @@ def _parts(rig: Rig) -> tuple[PartTopology, ...]:
     if rig.name not in _CUTS:
         _CUTS[rig.name] = partition(rig)
     return _CUTS[rig.name]
-
-

@@ -51,7 +51,7 @@ def train_parts(
     mask_mix: tuple[float, float, float] = MASK_MIX,
     max_bodies: int | None = None,
     jitter: float | None = None,
-    validation_bodies: int = 16,
+    validation_bodies: int = 6,
     ema: float = 0.999,
 ) -> dict[str, float]:
     """Train one network on the shards in `data`, going on where an earlier call stopped; returns its scores.

@@ -79,7 +79,7 @@ def capsule_man(name: str = "man", drop_deg: float = 0.0, materials: tuple[str, 
     # An odd number of cells and half a cell of shift: no node lies on the plane of symmetry.
     counts = (2 * np.ceil(half / PITCH) + 2).astype(int)
     low = np.array([0, HEIGHT / 2, 0.05]) - PITCH * (counts - 1) / 2
-    nodes = low + PITCH * np.moveaxis(np.indices(counts), 0, -1).reshape(-1, 3)
+    nodes = low + PITCH * np.moveaxis(np.indices(counts.tolist()), 0, -1).reshape(-1, 3)
     field = capsule_distances(nodes, drop).min(axis=1).reshape(counts)
     vertices, faces, _, _ = marching_cubes(field, 0.0, gradient_direction="descent")
     vertices = low + PITCH * vertices
@@ -104,7 +104,7 @@ def capsule_man(name: str = "man", drop_deg: float = 0.0, materials: tuple[str, 
         face_part=face_parts(faces, index, weight, parents, key_bone),
         face_material=(vertices[faces][:, :, 1].mean(axis=1) < 1.3) % len(materials), materials=materials,
         bone_index=index, bone_weight=weight, parents=parents, heads=heads, key_bone=key_bone,
-        rest_direction=rest_directions(heads, key_bone), finger_axis=axis,
+        rest_direction=rest_directions(heads, key_bone), finger_axis=axis.astype(np.float32),
         joint_bone=np.array([NAMES.index(n[:2] + bone if n[:2] in ("l_", "r_") else bone) for n, bone, _ in joints]),
         joint_rest=np.array([_placed(n, x, drop, bone) for n, bone, x in joints]),
     )  # fmt: skip
@@ -124,18 +124,18 @@ def bodies() -> AnnyBodies:
     share = np.clip((1.0 - skirt[:, 1]) * 2, 0, 1)[:, None] * np.stack([skirt[:, 0] > 0, skirt[:, 0] <= 0], axis=1)
     hung = [NAMES.index(n) for n in ("hips", "l_upper_leg", "r_upper_leg", "hips")]
 
-    def moved(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    def moved(points: NDArray[np.floating]) -> NDArray[np.float32]:
         """(2, N, 3): both shapes are linear in the place, so bones, joints and skin stay together."""
         zero = 0.0 * points[:, 0]
         return np.stack([
             np.stack([0.06 * points[:, 0], zero, zero], 1), np.stack([zero, 0.03 * points[:, 1], zero], 1)
-        ])  # fmt: skip
+        ]).astype(np.float32)  # fmt: skip
 
     corner = rig.vertices[rig.faces]
     return AnnyBodies(
         rig=rig,
         shapes=moved(np.concatenate([rig.vertices, rig.heads, rig.joint_rest])),
-        skirt=skirt,
+        skirt=skirt.astype(np.float32),
         skirt_faces=skirt_faces,
         skirt_shapes=moved(skirt),
         skirt_index=np.tile(hung, (len(skirt), 1)),
@@ -178,14 +178,15 @@ def poses(clip: str, count: int, seed: int) -> PoseSet:
     """Random stances, each a clip of its own."""
     rng = np.random.default_rng(seed)
     _, rotations = stances(count, rng)
-    return PoseSet(np.array([f"{clip}/{k}" for k in range(count)]), rotations, rng.uniform(0, 1, (count, 2)))
+    curl = rng.uniform(0, 1, (count, 2)).astype(np.float32)
+    return PoseSet(np.array([f"{clip}/{k}" for k in range(count)]), rotations.astype(np.float32), curl)
 
 
 @cache
 def capsule_pack() -> Pack:
-    """"Ann" is a character for training, "Ida" one that training never sees."""
+    """With "Ann", a character for training, and "Ida", one that training never sees."""
     colours = np.array([[0.9, 0.7, 0.6], [0.8, 0.1, 0.1]], np.float32)
-    people = tuple(
-        Character(capsule_man(name, drop, ("skin", "cloth.body.red")), colours) for name, drop in (("Ann", 0.0), ("Ida", 50.0))
-    )
-    return Pack(bodies(), wardrobe(), people, poses("seen", 8, 1), poses("unseen", 4, 2))
+    stances = {"Ann": 0.0, "Ida": 50.0}
+    people = (capsule_man(name, drop_deg, ("skin", "cloth.body.red")) for name, drop_deg in stances.items())
+    characters = tuple(Character(rig, colours) for rig in people)
+    return Pack(bodies(), wardrobe(), characters, poses("seen", 8, 1), poses("unseen", 4, 2))

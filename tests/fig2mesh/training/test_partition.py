@@ -54,7 +54,7 @@ def test_a_straight_cut_is_closed_by_a_flat_cap() -> None:
     faces = np.concatenate([
         np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3),
         np.stack([k, np.full(16, 48), (k + 1) % 16], 1), np.stack([32 + k, 32 + (k + 1) % 16, np.full(16, 49)], 1),
-    ])[:, ::-1]  # fmt: skip
+    ])  # fmt: skip
     vertices = np.concatenate([*rings, [[-1.0, 0, 0], [1.0, 0, 0]]])
     right = vertices[faces][:, :, 0].mean(axis=1) > 0
     man = capsule_man("man")

@@ -103,4 +103,4 @@ def test_records_of_wrong_shape_are_refused() -> None:
     with pytest.raises(ValueError, match="before its parent"):
         replace(rig, parents=rig.parents[::-1].copy())
     with pytest.raises(ValueError, match="curl"):
-        PoseSet(np.array(["a/0"]), np.tile(np.eye(3), (1, len(KEYS), 1, 1)), np.zeros((2, 2)))
+        PoseSet(np.array(["a/0"]), np.tile(np.eye(3), (1, len(KEYS), 1, 1)), np.zeros((2, 2), np.float32))

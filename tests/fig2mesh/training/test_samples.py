@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.ndimage import binary_erosion, map_coordinates
+from scipy.ndimage import binary_erosion, binary_fill_holes, map_coordinates
 
 from fig2mesh.parts.kinds import anchor_joints, part_centre
 from fig2mesh.records import BODY_PARTS
@@ -22,9 +22,6 @@ from tests.fig2mesh.training.figures import capsule_pack
 
 NODES = 32
 """Of the dense grids here; real ones have twice as many, and take eight times as long."""
-
-HALF = {"rtol": 1e-3, "atol": 1e-4}
-"""Half precision has 11 bits."""
 
 PIXEL = (np.arange(MASK) + 0.5) / MASK * 2 - 1
 
@@ -53,7 +50,7 @@ def coarse_grids() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def sample(coarse_grids: None) -> Sample:
-    """Of the ninth subject, who wears a skirt."""
+    """Of the first subject who wears a skirt."""
     subject = next(s for s in (draw_subject(capsule_pack(), "train", k) for k in range(60)) if len(s.skirt_faces))
     return _sample(subject)
 
@@ -82,9 +79,10 @@ def test_as_many_points_inside_as_outside_at_distances_of_the_mesh(sample: Sampl
         row = part.part - 1
         vertices, faces = part.solid(sample.subject.vertices)
         local = 2 * (vertices - sample.arrays["centre"][row]) / sample.arrays["edge"][row]
-        some = np.r_[0:80, POINTS : POINTS + 80]
+        some = np.r_[0:60, POINTS : POINTS + 60]
         found = signed_distance_torch(local, faces, sample.arrays["points"][row][some].astype(np.float32))
-        np.testing.assert_allclose(distance[row][some], found, **HALF)
+        # Half precision has 11 bits.
+        np.testing.assert_allclose(distance[row][some], found, rtol=1e-3, atol=1e-4)
 
 
 def test_distances_never_change_faster_than_places(sample: Sample) -> None:
@@ -120,7 +118,8 @@ def test_the_cube_holds_the_part_and_is_centred_on_its_anchors(sample: Sample) -
         local = 2 * (vertices - sample.arrays["centre"][row]) / sample.arrays["edge"][row]
         assert np.abs(local).max() == pytest.approx(1 / samples.MARGIN, abs=1e-5)
         np.testing.assert_allclose(sample.arrays["size"][row], np.ptp(vertices, axis=0), atol=1e-5)
-        np.testing.assert_allclose(sample.arrays["centre"][row], part_centre(part.part, sample.subject.joints), atol=1e-6)
+        centre = part_centre(part.part, sample.subject.joints)
+        np.testing.assert_allclose(sample.arrays["centre"][row], centre, atol=1e-6)
 
 
 def test_joints_lie_in_their_parts(sample: Sample) -> None:
@@ -136,15 +135,20 @@ def test_masks_are_the_silhouettes_of_the_fields(sample: Sample, cut: Sample, vi
     column, row, depth = np.meshgrid(PIXEL, -PIXEL, nodes)
     points = np.stack([column, row, depth], axis=-1) @ VIEWS[view]
     where = np.moveaxis((points + 1) * (NODES - 1) / 2, -1, 0)
+    agreement = []
     for part in range(14):
         field = map_coordinates(cut.arrays["grid"][part].astype(np.float32), where, order=1).min(axis=2)
-        own = cut.amodal[view, part]
-        assert ((field < 0) & own).sum() / ((field < 0) | own).sum() > 0.9, part
+        # Masks are drawn from a part's own faces: seen along a limb, its open ends are a hole.
+        own = binary_fill_holes(cut.amodal[view, part])
+        agreement.append(((field < 0) & own).sum() / ((field < 0) | own).sum())
         # With rings the field reaches further than what is drawn, but nowhere less far than by half a node's spacing.
         field = map_coordinates(sample.arrays["grid"][part].astype(np.float32), where, order=1).min(axis=2)
         own = sample.amodal[view, part]
         assert field[own].max() < 1 / (NODES - 1), part
         assert (field < 0).sum() > own.sum(), part
+    # Half as many nodes as real grids have lose the ragged rims of cuts.
+    assert min(agreement) > 0.85
+    assert np.mean(agreement) > 0.93
 
 
 def test_what_is_seen_is_part_of_the_whole_and_never_two_parts_at_once(sample: Sample) -> None:

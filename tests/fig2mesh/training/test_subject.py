@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import fields
 
 import numpy as np
@@ -21,10 +21,9 @@ UNSEEN = {"Ida", "suit", "boots"}
 
 
 @pytest.fixture(autouse=True)
-def no_cuts_of_other_tests(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def no_cuts_of_other_tests(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cuts are kept by the rig's name for a whole process."""
     monkeypatch.setattr(subject_module, "_CUTS", {})
-    yield
 
 
 def drawn(split: str, count: int = 60) -> list[Subject]:
@@ -98,7 +97,7 @@ MEASURES = {
     "head": _alone("head", 1), "hand": _alone("l_finger", 2), "foot": _alone("r_foot", 0),
     "arm_length": _between("l_shoulder", "l_elbow"), "leg_length": _between("r_hip", "r_knee"),
     "arm_girth": _alone("r_lower_arm", 2), "leg_girth": _alone("l_upper_leg", 2),
-    "torso_width": _alone("spine1", 0), "torso_height": _between("thorax", "pelvis"), "torso_depth": _alone("spine1", 2),
+    "torso_width": _alone("hips", 0), "torso_height": _between("thorax", "pelvis"), "torso_depth": _alone("hips", 2),
 }  # fmt: skip
 
 
