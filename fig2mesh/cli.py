@@ -88,8 +88,8 @@ def cli() -> None:
 @click.option("--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles).")
 @click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
 @click.option(
-    "--parts", type=click.Choice(["network", "paper", "outline"]), default="network", show_default=True,
-    help="What depths come from: our networks, the paper's, or the outline alone.",
+    "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
+    help="What depths come from: networks, or rules and the outline alone.",
 )  # fmt: skip
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)

@@ -46,13 +46,11 @@ def _weights() -> tuple[str, bool, str]:
     try:
         from fig2mesh.nets import part_size, pose_lift, weights
         from fig2mesh.parts.kinds import KINDS
-        from fig2mesh.parts.network import VARIANTS
 
         pose_lift.load()
         for kind in KINDS:
             part_size.load(kind)
-            for variant in VARIANTS.values():
-                weights.load(kind, variant)
+            weights.load(kind)
     except Exception as error:
         return "weights", False, " ".join(str(error).split())[:200]
     megabytes = sum(path.stat().st_size for path in weights.FOLDER.glob("*.safetensors")) / 1e6

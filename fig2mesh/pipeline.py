@@ -22,7 +22,7 @@ from fig2mesh.mesh.solid import Solid, make_solid
 from fig2mesh.mesh.unwrap import unwrap
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
-from fig2mesh.parts.network import VARIANTS, part_inference
+from fig2mesh.parts.network import part_inference
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.placing import asset_from_figure
 from fig2mesh.pose.network import lift_by_network
@@ -61,7 +61,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, 0.9 * settings.voxel)
         infer = None
         if settings.parts != "outline":
-            infer = part_inference(VARIANTS[settings.parts], pose, settings.device)
+            infer = part_inference(pose, settings.device)
         return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device, infer=infer)
 
     def assemble(outline: Outline) -> Body:

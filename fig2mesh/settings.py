@@ -8,7 +8,7 @@ from typing import Literal
 Quality = Literal["draft", "standard", "fine"]
 Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
-Parts = Literal["network", "paper", "outline"]
+Parts = Literal["network", "outline"]
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Settings:
     lods : number of meshes, the finest included; each has a quarter of the triangles of the one before
     mesher : how the surface becomes a mesh
     closing : what closes the holes that ball pivoting leaves
-    parts : what depths come from: our networks, the paper's, or rules and the outline alone
+    parts : what depths come from: networks, or rules and the outline alone
     device : "cpu" or "cuda"
     seed : of everything random
     """

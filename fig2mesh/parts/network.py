@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from fig2mesh.nets.disn import Disn
     from fig2mesh.nets.part_size import PartSizeNet
 
-VARIANTS = {"network": "bone", "paper": "two-stream-pose"}
-"""`--parts` → variant of the networks (`fig2mesh.nets.disn.VARIANTS`)."""
-
 MASK = 64
 NODES = 64
 
@@ -139,11 +136,11 @@ def part_mask(canvas: Canvas, region: BoolArray, centre: NDArray[np.float64], ed
     return np.asarray(ndimage.map_coordinates(image, where, order=1, mode="constant") > 0.5)
 
 
-def part_inference(variant: str, pose: Pose3D, device: str = "cpu") -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
+def part_inference(pose: Pose3D, device: str = "cpu") -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
     """`network_parts` with the networks that come with the package, loaded once a process."""
     from fig2mesh.nets import weights
 
-    nets = {kind: weights.load(kind, variant).to(device) for kind in KINDS}
+    nets = {kind: weights.load(kind).to(device) for kind in KINDS}
     sizes = shipped_sizes()
     joints = pose.joints.astype(np.float64)
     return lambda canvas, divided: network_parts(canvas, divided, joints, nets, sizes)

@@ -13,7 +13,7 @@ from fig2mesh.field.distance import grid_distance
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.kinds import anchor_joints
-from fig2mesh.records import BODY_PARTS, JOINT_NAMES, Figure, PartSdf
+from fig2mesh.records import BODY_PARTS, JOINT_NAMES, Figure
 from fig2mesh.training.pack import Pack
 from fig2mesh.training.samples import scene
 from fig2mesh.training.sdf import signed_distance
@@ -48,7 +48,7 @@ class Truth:
 def truth_of(subject: Subject, seed: int = 0) -> Truth:
     """The drawing of a subject's front and what is behind it; what hangs free of the body is not drawn."""
     bare = replace(subject, skirt_vertices=np.zeros((0, 3)), skirt_faces=np.zeros((0, 3), np.int32))
-    raster, labels, corner, pitch = scene(bare, 0, PICTURE)
+    _, labels, corner, pitch = scene(bare, 0, PICTURE)
     columns = (subject.joints[:, 0] - corner[0]) / pitch
     rows = PICTURE - (subject.joints[:, 1] - corner[1]) / pitch
     showing = {name: set(TRUNK.get(name, ())) for name in JOINT_NAMES}
@@ -62,9 +62,7 @@ def truth_of(subject: Subject, seed: int = 0) -> Truth:
     mask = labels > 0
     rgba = np.zeros((PICTURE, PICTURE, 4), np.uint8)
     rgba[mask] = (200, 190, 170, 255)
-    figure = Figure(
-        "synthetic", rgba, mask, np.stack([columns, rows], axis=1), np.array(seen), np.zeros_like(labels)
-    )
+    figure = Figure("synthetic", rgba, mask, np.stack([columns, rows], axis=1), np.array(seen), np.zeros_like(labels))
     scale = image_frame(figure).units_per_px / pitch
     solids = {part.part: part.solid(subject.vertices * scale) for part in subject.parts}
     corners = (subject.vertices * scale)[subject.rig.faces]
@@ -124,15 +122,15 @@ class Measured:
     ious: dict[int, float]
 
 
-ROADS = ("outline", "paper's networks", "networks", "plain union of the networks' parts")
-"""What is compared: the drawn outline and rules alone; the two sets of networks down the same road; and the networks'
-parts put together as they are (paper §4.3)."""
+ROADS = ("outline", "networks", "plain union of the networks' parts")
+"""What is compared: the drawn outline and rules alone; the networks with the drawn outline; and the networks' parts put
+together as they are (paper §4.3)."""
 
 
 def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
     """One held-out figure down every road."""
     from fig2mesh.parts.canvas import make_canvas
-    from fig2mesh.parts.network import VARIANTS, part_inference
+    from fig2mesh.parts.network import part_inference
     from fig2mesh.parts.outline import outline_parts
     from fig2mesh.parts.split import split as divide
     from fig2mesh.pose.network import lift_by_network
@@ -143,16 +141,20 @@ def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
     truth = truth_of(draw_subject(pack, split, seed))
     frame = image_frame(truth.figure)
     canvas = make_canvas(truth.figure, frame, settings.canvas_px, 0.9 * settings.voxel)
-    made: dict[str, tuple[PartSdf, ...]] = {}
-    for road, variant in zip(ROADS, (None, "paper", "network", None), strict=False):
-        pose = lift(truth.figure, frame) if variant is None else lift_by_network(truth.figure, frame)
-        if road == ROADS[3]:
-            pose = lift_by_network(truth.figure, frame)
-            divided = divide(canvas, pose.joints.astype(np.float64), truth.figure.visible)
-            made[road] = part_inference(VARIANTS["network"], pose)(canvas, divided)
-            continue
-        infer = None if variant is None else part_inference(VARIANTS[variant], pose)
-        made[road] = outline_parts(canvas, pose, truth.figure.visible, voxel=settings.voxel, infer=infer).parts
+    pose = lift_by_network(truth.figure, frame)
+    infer = part_inference(pose)
+    seen, voxel = truth.figure.visible, settings.voxel
+    made = dict(
+        zip(
+            ROADS,
+            (
+                outline_parts(canvas, lift(truth.figure, frame), seen, voxel=voxel).parts,
+                outline_parts(canvas, pose, seen, voxel=voxel, infer=infer).parts,
+                infer(canvas, divide(canvas, pose.joints.astype(np.float64), seen)),
+            ),
+            strict=True,
+        )
+    )
     result = {}
     for road, parts in made.items():
         distance, shift = chamfer(Body(parts), truth)
@@ -163,4 +165,4 @@ def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
 def _on_triangles(corners: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     chosen = corners[rng.choice(len(corners), SAMPLES, p=area / area.sum())]
-    return np.einsum("nk,nkc->nc", rng.dirichlet((1.0, 1.0, 1.0), SAMPLES), chosen)
+    return np.asarray(np.einsum("nk,nkc->nc", rng.dirichlet((1.0, 1.0, 1.0), SAMPLES), chosen))

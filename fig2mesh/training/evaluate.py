@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from fig2mesh.nets import part_size, weights
-from fig2mesh.nets.disn import Disn, DisnShape
+from fig2mesh.nets.disn import VARIANTS, Disn, DisnShape
 from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, pose_path, read_pose
 from fig2mesh.paper import PART_IOU, PART_RMSE, POSE_SCORES, VARIANT_SCORES
 from fig2mesh.parts.kinds import KINDS, PART_KIND
@@ -22,6 +22,9 @@ from fig2mesh.training.pack import Pack
 
 SPLITS: Final = ("valid-clips", "valid-characters")
 SPLIT_TITLE: Final = {"valid-clips": "held-out clips", "valid-characters": "held-out characters"}
+
+RULED: Final = 600
+"""Samples by which the rule without network is scored; it takes them one by one."""
 
 Say = Callable[[str], None]
 
@@ -45,22 +48,24 @@ def evaluate(pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(
         f"Part fields: {limits.bodies} bodies of each held-out split, from all four sides; "
         f"whole figures: {limits.figures} of each.",
     ]
-    for title, table in (
+    made: tuple[tuple[str, Callable[[], str]], ...] = (
         ("Table 1: pose", lambda: _pose_table(pack, runs)),
         ("Table 2: variants of the part network, hands", lambda: _variant_table(data, runs, limits.bodies)),
         ("Table 3: parts", lambda: _part_tables(data, limits.bodies)),
         ("Part sizes", lambda: _size_table(data)),
         ("Whole figures", lambda: _figure_table(pack, limits.figures)),
-    ):
+    )
+    for title, make in made:
         say(title)
-        sections += [f"## {title}", table()]
+        sections += [f"## {title}", make()]
     return "\n\n".join(sections) + "\n"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A Markdown table; the first column is text, the others numbers."""
     line = "|" + "|".join(["---", *["---:"] * (len(head) - 1)]) + "|"
-    return "\n".join(["| " + " | ".join(row) + " |" for row in (head,)] + [line] + ["| " + " | ".join(r) + " |" for r in rows])
+    lines = ["| " + " | ".join(row) + " |" for row in (head, *rows)]
+    return "\n".join([lines[0], line, *lines[1:]])
 
 
 def _pose_table(pack: Pack, runs: Path | None) -> str:
@@ -82,21 +87,23 @@ def _pose_table(pack: Pack, runs: Path | None) -> str:
             theirs = POSE_SCORES[joints, perspective]
             name = f"{joints} joints, {'perspective' if perspective else 'orthographic'}"
             found = _pose_network(runs, PoseLiftShape(joints, perspective, metric=True))
-            ours = ("not trained", "") if found is None else _pose_cells(pose_scores(found, sample("sides", perspective)))
+            ours = ("not trained", "")
+            if found is not None:
+                ours = _pose_cells(pose_scores(found, sample("sides", perspective)))
             rows.append((name, f"{theirs[0]:.2f}", f"{theirs[1]:.2f}", *ours))
-    first = table(("network of the paper, on four sides", "paper RMSE mm", "paper PCK150 %", "RMSE mm", "PCK150 %"), rows)
+    head = ("network of the paper, on four sides", "paper RMSE mm", "paper PCK150 %", "RMSE mm", "PCK150 %")
+    first = table(head, rows)
     shipped, _ = read_pose(pose_path(PoseLiftShape()))
     rows = []
     for view, title in (("sides", "four sides"), ("around", "any side"), ("drawn", "as drawings are")):
         one = sample(view, False)
         rows.append((title, *_pose_cells(pose_scores(shipped, one)), *_pose_cells(_rule_scores(one))))
-    second = table(
-        ("shipped network, 21 joints, any scale", "RMSE mm", "PCK150 %", "rule without network RMSE mm", "PCK150 %"), rows
-    )
+    head = ("shipped network, 21 joints, any scale", "RMSE mm", "PCK150 %", "rule without network RMSE mm", "PCK150 %")
+    second = table(head, rows)
     text = (
         "RMSE is the square root of the mean squared 3D distance over joints and samples, PCK150 the share of joints "
         f"within 150 mm; {COUNT} pairs of a held-out pose and a held-out body that stands 1.79 m. The shipped network "
-        "does not know the scale of a drawing; those of the first table do, as the paper's. \"As drawings are\": "
+        'does not know the scale of a drawing; those of the first table do, as the paper\'s. "As drawings are": '
         "disproportionate limbs and heads, joints a little off, hidden ones guessed."
     )
     return f"{text}\n\n{first}\n\n{second}"
@@ -118,7 +125,8 @@ def _rule_scores(sample: Any) -> dict[str, float]:
     from fig2mesh.records import Figure
 
     errors = []
-    for drawn, seen, truth in zip(*(t.numpy()[:600] for t in (sample.drawn, sample.visible, sample.joints)), strict=True):
+    arrays = (tensor.numpy()[:RULED] for tensor in (sample.drawn, sample.visible, sample.joints))
+    for drawn, seen, truth in zip(*arrays, strict=True):
         blank = np.zeros((1, 1), np.uint8)
         figure = Figure("", np.zeros((1, 1, 4), np.uint8), blank > 0, drawn * [1, -1], seen, blank)
         errors.append(lift(figure, ImageFrame((0.0, 0.0), 1.0)).joints[:, 2] - truth[:, 2])
@@ -127,7 +135,7 @@ def _rule_scores(sample: Any) -> dict[str, float]:
 
 
 def _variant_table(data: Path, runs: Path | None, bodies: int) -> str:
-    names = ("one-stream", "two-stream", "one-stream-pose", "two-stream-pose", "bone")
+    names = tuple(VARIANTS)
     rows = []
     for variant in names:
         shape = DisnShape.of("hand", variant)
@@ -158,27 +166,25 @@ def _part_scores(net: Disn, data: Path, split: str, mask: str, bodies: int) -> d
 
 
 def _part_tables(data: Path, bodies: int) -> str:
-    text = [
-        "RMSE over all nodes of a 64³ grid, PART units; IoU of what is inside. The cube of each part is the true one, as "
-        "in the paper. Visible: the mask shows what the drawing would, and is empty for hidden parts; whole: the mask of "
-        "the whole part."
-    ]
-    for variant, title in (("two-stream-pose", "the paper's network (two-stream, pose points)"), ("bone", "ours (bone)")):
-        rows = []
-        for kind in KINDS:
-            net = weights.load(kind, variant)
-            cells = [kind.replace("_", " "), f"{PART_RMSE[kind]:.3f}", f"{PART_IOU[kind]:.1f}"]
-            for split in SPLITS:
-                for mask in ("visible", "amodal"):
-                    found = _part_scores(net, data, split, mask, bodies)
-                    cells += [f"{found['rmse']:.3f}", f"{100 * found['iou']:.1f}"]
-            rows.append(cells)
-        head = [title, "paper RMSE", "paper IoU %"]
+    text = (
+        "The shipped networks: two-stream with pose points. RMSE over all nodes of a 64³ grid, PART units; IoU of what "
+        "is inside. The cube of each part is the true one, as in the paper. Visible: the mask shows what the drawing "
+        "would, and is empty for hidden parts; whole: the mask of the whole part."
+    )
+    rows = []
+    for kind in KINDS:
+        net = weights.load(kind)
+        cells = [kind.replace("_", " "), f"{PART_RMSE[kind]:.3f}", f"{PART_IOU[kind]:.1f}"]
         for split in SPLITS:
-            for mask in ("visible", "whole"):
-                head += [f"{SPLIT_TITLE[split]}, {mask}: RMSE", "IoU %"]
-        text.append(table(head, rows))
-    return "\n\n".join(text)
+            for mask in ("visible", "amodal"):
+                found = _part_scores(net, data, split, mask, bodies)
+                cells += [f"{found['rmse']:.3f}", f"{100 * found['iou']:.1f}"]
+        rows.append(cells)
+    head = ["part", "paper RMSE", "paper IoU %"]
+    for split in SPLITS:
+        for mask in ("visible", "whole"):
+            head += [f"{SPLIT_TITLE[split]}, {mask}: RMSE", "IoU %"]
+    return f"{text}\n\n{table(head, rows)}"
 
 
 def _size_table(data: Path) -> str:
@@ -194,9 +200,8 @@ def _size_table(data: Path) -> str:
         rows.append((kind.replace("_", " "), *cells))
     head = [f"{what}, {mask}" for what in ("depth", "edge") for mask in ("whole mask", "visible", "none")]
     head = [f"{SPLIT_TITLE[split]}: {head[0]}" if i == 0 else name for split in SPLITS for i, name in enumerate(head)]
-    return (
-        "Mean relative errors in percent of the part's extent in depth and of the edge of its cube.\n\n"
-        + table(("part", *head), rows)
+    return "Mean relative errors in percent of the part's extent in depth and of the edge of its cube.\n\n" + table(
+        ("part", *head), rows
     )
 
 
@@ -220,12 +225,10 @@ def _figure_table(pack: Pack, figures: int) -> str:
             means = [f"{100 * float(np.nanmean(values)):.1f}" for values in by_kind.values()]
             parts.append((f"{SPLIT_TITLE[split]}: {road}", *means))
     text = (
-        "Drawings of dressed bodies (front view; silhouette and 2D joints are given, depths are not) against the bodies "
-        "themselves, scaled to a drawn height of 1.79 m. A drawing does not say how far away a figure stands: its mean "
-        "depth is made equal first. Chamfer: mean distance of the surfaces, both ways averaged."
+        "Drawings of dressed bodies (front view; silhouette and 2D joints are given, depths are not) against the "
+        "bodies themselves, scaled to a drawn height of 1.79 m. A drawing does not say how far away a figure stands: "
+        "its mean depth is made equal first. Chamfer: mean distance of the surfaces, both ways averaged."
     )
     first = table(("road", "chamfer mm", "median mm", "part IoU %"), rows)
     second = table(("part IoU %", *(kind.replace("_", " ") for kind in KINDS)), parts)
     return f"{text}\n\n{first}\n\n{second}"
-
-

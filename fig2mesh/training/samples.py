@@ -107,7 +107,7 @@ def _amodal(
     lookup = np.full(int(part.faces.max()) + 1, -1)
     lookup[part.faces.ravel()] = inverse.ravel()
     seen = [coverage(vertices @ VIEWS[k].T, lookup[own], size=MASK, low=(-1.0, -1.0), pitch=2.0 / MASK) for k in (0, 1)]
-    # Own faces are an open tube: along its axis one looks through it, where a drawing shows what is behind as a part too.
+    # Own faces are an open tube, and along its axis one looks through; drawn regions have no such holes.
     seen = [filled(mask) for mask in seen]
     return np.stack([seen[0], seen[1], seen[0][:, ::-1], seen[1][:, ::-1]])
 

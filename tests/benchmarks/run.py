@@ -124,7 +124,7 @@ def decoding() -> dict[str, dict[str, Any]]:
     from fig2mesh.parse.read import read_figure
     from fig2mesh.parts.canvas import make_canvas
     from fig2mesh.parts.kinds import PART_KIND
-    from fig2mesh.parts.network import VARIANTS, network_inputs, shipped_sizes
+    from fig2mesh.parts.network import network_inputs, shipped_sizes
     from fig2mesh.parts.split import split
     from fig2mesh.pose.network import lift_by_network
 
@@ -133,19 +133,15 @@ def decoding() -> dict[str, dict[str, Any]]:
     canvas = make_canvas(figure, frame, 448)
     joints = lift_by_network(figure, frame).joints.astype(np.float64)
     inputs = network_inputs(canvas, split(canvas, joints, figure.visible), joints, shipped_sizes())
-    found = {}
-    for name, variant in VARIANTS.items():
-        nets = {kind: weights.load(kind, variant) for kind in set(PART_KIND.values())}
-        work = [(nets[PART_KIND[part]], given.mask, given.anchors) for part, given in inputs.items()]
-        counts = [decode_counted(*part).evaluated for part in work]
-        fast = statistics.median(_seconds(lambda work=work: [decode_counted(*part) for part in work]) for _ in range(3))
-        dense = _seconds(lambda work=work: [decode_dense(*part) for part in work])
-        share = 100 * sum(counts) / (len(counts) * 64**3)
-        suffix = "" if name == "network" else f"_{name}"
-        how = f"14 parts at 64³, {variant}: {share:.0f} % of the nodes asked for; median of 3"
-        found[f"decode{suffix}_s"] = _value(fast, "s", how)
-        found[f"decode_dense{suffix}_s"] = _value(dense, "s", f"14 parts at 64³, {variant}: every node; once")
-    return found
+    work = [(weights.load(PART_KIND[part]), given.mask, given.anchors) for part, given in inputs.items()]
+    counts = [decode_counted(*part).evaluated for part in work]
+    fast = statistics.median(_seconds(lambda: [decode_counted(*part) for part in work]) for _ in range(3))
+    dense = statistics.median(_seconds(lambda: [decode_dense(*part) for part in work]) for _ in range(3))
+    share = 100 * sum(counts) / (len(counts) * 64**3)
+    return {
+        "decode_s": _value(fast, "s", f"14 parts at 64³, {share:.0f} % of the nodes asked for; median of 3"),
+        "decode_dense_s": _value(dense, "s", "14 parts at 64³, every node; median of 3"),
+    }
 
 
 def _seconds(job: Callable[[], Any]) -> float:
