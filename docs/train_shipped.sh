@@ -9,33 +9,29 @@ TRAIN="${FIG2MESH:-.venv/bin/fig2mesh} train"
 mkdir -p "$RUNS"
 
 first() {
-  $TRAIN pose --data "$PACK" --budget 8 -o "$RUNS/pose-21"
   $TRAIN size --data "$DATA" --budget 0.4 -o "$RUNS"
   part upper_arm upper_leg lower_leg foot
-  variants one-stream one-stream-pose
+  for seed in 1 2 3; do
+    for variant in one-stream one-stream-pose two-stream two-stream-pose; do
+      $TRAIN parts --data "$DATA" --kind hand --variant "$variant" --budget 1 --seed $seed -o "$RUNS/table2/$seed"
+    done
+  done
 }
 
 second() {
-  part hand torso head lower_arm
+  part hand
+  $TRAIN pose --data "$PACK" --budget 10 -o "$RUNS/pose-21"
+  part torso head lower_arm
   for joints in 21 16; do
-    $TRAIN pose --data "$PACK" --joints $joints --metric --plain --budget 2 -o "$RUNS/table1/pose-$joints"
-    $TRAIN pose --data "$PACK" --joints $joints --metric --plain --perspective --budget 2 \
-      -o "$RUNS/table1/pose-$joints-perspective"
+    for view in "" --perspective; do
+      $TRAIN pose --data "$PACK" --joints $joints --metric --plain $view --budget 2.5 -o "$RUNS/table1/$joints$view"
+    done
   done
-  variants two-stream two-stream-pose
 }
 
 part() {
   for kind in "$@"; do
     $TRAIN parts --data "$DATA" --kind "$kind" --budget 9 -o "$RUNS"
-  done
-}
-
-variants() {
-  for seed in 1 2 3; do
-    for variant in "$@"; do
-      $TRAIN parts --data "$DATA" --kind hand --variant "$variant" --budget 1.75 --seed $seed -o "$RUNS/table2/$seed"
-    done
   done
 }
 

@@ -9,7 +9,7 @@ own bones tell (`bone_scale`), and the output multiplied by it; `metric` network
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -27,6 +27,7 @@ from fig2mesh.records import JOINT, JOINT_NAMES
 WIDTH: Final = 1024
 BLOCKS: Final = 2
 DROPOUT: Final = 0.5
+"""Of Martinez et al.; training on endless skeletons does better with less."""
 
 ADDED: Final = ("eyes", "l_hand", "r_hand", "l_foot", "r_foot")
 """The five joints that the paper adds to the sixteen of Martinez et al."""
@@ -40,6 +41,20 @@ BONES: Final = tuple(
     for side in ("lr" if "*" in first + second else "l")
 )  # fmt: skip
 """Pairs of joints whose drawn distances tell the scale; joints that both networks have."""
+
+LIMBS: Final = tuple(
+    (JOINT[first.replace("*", side)], JOINT[second.replace("*", side)])
+    for first, second in (
+        ("pelvis", "thorax"), ("thorax", "neck"), ("neck", "head"), ("head", "eyes"), ("thorax", "*_shoulder"),
+        ("*_shoulder", "*_elbow"), ("*_elbow", "*_wrist"), ("*_wrist", "*_hand"), ("pelvis", "*_hip"),
+        ("*_hip", "*_knee"), ("*_knee", "*_ankle"), ("*_ankle", "*_foot"),
+    )
+    for side in ("lr" if "*" in second else "l")
+)  # fmt: skip
+"""Pairs of joints between which a drawn bone is foreshortened by its depth."""
+
+LONGEST: Final = 2.0
+"""Drawn lengths beyond this many usual ones say no more."""
 
 QUANTILE: Final = 0.8
 """Most bones are foreshortened, and some are drawn too long: this quantile of drawn to usual length is the scale."""
@@ -62,6 +77,8 @@ class PoseLiftShape:
     joints : 21, or the 16 of Martinez et al.
     perspective : the drawing is one, so x and y are predicted too
     visibility : whether a joint is seen is an input
+    limbs : how foreshortened each limb is drawn is an input too: its length l in usual lengths, and √(1 − l²), which is
+        the depth between its ends but for the sign
     metric : drawn joints are in FIGURE units of a figure that stands 1.79 tall, instead of any unit
     width : of the layers
     """
@@ -69,6 +86,7 @@ class PoseLiftShape:
     joints: int = 21
     perspective: bool = False
     visibility: bool = False
+    limbs: bool = False
     metric: bool = False
     width: int = WIDTH
 
@@ -82,35 +100,52 @@ class PoseLiftShape:
         dropped = ADDED if self.joints == 16 else ()
         return tuple(JOINT[name] for name in JOINT_NAMES if name not in dropped)
 
+    @property
+    def bones(self) -> tuple[tuple[int, int], ...]:
+        """The pairs of `LIMBS` that the network knows."""
+        known = self.indices
+        return tuple(pair for pair in LIMBS if pair[0] in known and pair[1] in known)
+
+    @property
+    def inputs(self) -> int:
+        """Numbers that go in."""
+        return self.joints * (3 if self.visibility else 2) + (2 * len(self.bones) if self.limbs else 0)
+
+
+SHIPPED: Final = PoseLiftShape(limbs=True)
+"""The network for drawn figures."""
+
 
 class _Block(nn.Module):
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, dropout: float) -> None:
         super().__init__()
-        self.layers = nn.Sequential(*_layer(width, width), *_layer(width, width))
+        self.layers = nn.Sequential(*_layer(width, width, dropout), *_layer(width, width, dropout))
 
     def forward(self, hidden: Tensor) -> Tensor:
         added: Tensor = self.layers(hidden)
         return hidden + added
 
 
-def _layer(inputs: int, outputs: int) -> tuple[nn.Module, ...]:
+def _layer(inputs: int, outputs: int, dropout: float) -> tuple[nn.Module, ...]:
     linear = nn.Linear(inputs, outputs)
     nn.init.kaiming_normal_(linear.weight)
-    return linear, nn.BatchNorm1d(outputs), nn.ReLU(), nn.Dropout(DROPOUT)
+    return linear, nn.BatchNorm1d(outputs), nn.ReLU(), nn.Dropout(dropout)
 
 
 class PoseLift(nn.Module):
-    """The network of a shape; `bone_length` (len(BONES),) holds the usual length of each bone, FIGURE units."""
+    """The network of a shape; `bone_length` (len(BONES),) and `limb_length` hold usual lengths, FIGURE units."""
 
-    def __init__(self, shape: PoseLiftShape) -> None:
+    def __init__(self, shape: PoseLiftShape, dropout: float = DROPOUT) -> None:
         super().__init__()
         self.shape = shape
         count, width = shape.joints, shape.width
-        self.first = nn.Sequential(*_layer(count * (3 if shape.visibility else 2), width))
-        self.blocks = nn.Sequential(*(_Block(width) for _ in range(BLOCKS)))
+        self.first = nn.Sequential(*_layer(shape.inputs, width, dropout))
+        self.blocks = nn.Sequential(*(_Block(width, dropout) for _ in range(BLOCKS)))
         self.last = nn.Linear(width, count * (3 if shape.perspective else 1))
         self.register_buffer("bone_length", torch.tensor(USUAL_LENGTHS))
         self.bone_length: Tensor
+        self.register_buffer("limb_length", torch.ones(len(shape.bones) if shape.limbs else 0))
+        self.limb_length: Tensor
 
     def forward(self, drawn: Tensor, visible: Tensor | None = None) -> Tensor:
         """(N, J, 3) joints about the pelvis in the unit of `drawn`.
@@ -121,7 +156,10 @@ class PoseLift(nn.Module):
         pelvis = shape.indices.index(JOINT["pelvis"])
         flat = drawn - drawn[:, pelvis : pelvis + 1]
         scale = flat.new_ones(len(flat)) if shape.metric else self.scale(flat)
-        inputs = (flat / scale[:, None, None]).flatten(1)
+        drawn = flat / scale[:, None, None]
+        inputs = drawn.flatten(1)
+        if shape.limbs:
+            inputs = torch.cat([inputs, self.foreshortened(drawn)], dim=1)
         if shape.visibility:
             hidden = torch.zeros_like(flat[..., 0]) if visible is None else 1 - visible.to(flat.dtype)
             inputs = torch.cat([inputs, hidden], dim=1)
@@ -129,6 +167,14 @@ class PoseLift(nn.Module):
         result = raw.reshape(len(flat), shape.joints, -1) * scale[:, None, None]
         result = result - result[:, pelvis : pelvis + 1]
         return result if shape.perspective else torch.cat([flat, result], dim=2)
+
+    def foreshortened(self, drawn: Tensor) -> Tensor:
+        """(N, 2 len(bones)) drawn length of each limb of joints (N, J, 2) in usual lengths, and what depth is left."""
+        indices = self.shape.indices
+        first = [indices.index(a) for a, _ in self.shape.bones]
+        second = [indices.index(b) for _, b in self.shape.bones]
+        length = ((drawn[:, first] - drawn[:, second]).norm(dim=2) / self.limb_length).clamp_max(LONGEST)
+        return torch.cat([length, (1 - length.square()).clamp_min(0).sqrt()], dim=1)
 
     def scale(self, drawn: Tensor) -> Tensor:
         """(N,) unit of drawn joints (N, J, 2) in FIGURE units of a figure of usual limbs."""
@@ -139,9 +185,9 @@ class PoseLift(nn.Module):
         return torch.quantile(ratios.float(), QUANTILE, dim=1).clamp_min(LEAST_SCALE)
 
 
-def bone_lengths(joints: Tensor) -> Tensor:
-    """(len(BONES),) mean lengths of `BONES` over joints (N, 21, 3)."""
-    return torch.stack([(joints[:, a] - joints[:, b]).norm(dim=1).mean() for a, b in BONES])
+def bone_lengths(joints: Tensor, bones: Sequence[tuple[int, int]] = BONES) -> Tensor:
+    """(len(bones),) mean lengths of bones over joints (N, 21, 3)."""
+    return torch.stack([(joints[:, a] - joints[:, b]).norm(dim=1).mean() for a, b in bones])
 
 
 @torch.no_grad()
@@ -175,7 +221,7 @@ def lift_joints(
 
 def pose_path(shape: PoseLiftShape, folder: Path = weights.FOLDER) -> Path:
     """Where the weights of a pose network are."""
-    marks = [name for name in ("perspective", "visibility", "metric") if getattr(shape, name)]
+    marks = [name for name in ("perspective", "visibility", "limbs", "metric") if getattr(shape, name)]
     return folder / f"{'-'.join(['pose', str(shape.joints), *marks])}.safetensors"
 
 
@@ -200,6 +246,6 @@ def read_pose(path: Path) -> tuple[PoseLift, dict[str, Any]]:
 
 
 @functools.cache
-def load(visibility: bool = False) -> PoseLift:
+def load() -> PoseLift:
     """The shipped network for drawn figures, read once a process."""
-    return read_pose(pose_path(PoseLiftShape(visibility=visibility)))[0]
+    return read_pose(pose_path(SHIPPED))[0]

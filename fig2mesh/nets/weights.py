@@ -80,7 +80,7 @@ def read_disn(path: Path) -> tuple[Disn, dict[str, Any]]:
 
 
 @functools.cache
-def load(kind: str, variant: str = "bone") -> Disn:
+def load(kind: str, variant: str = "two-stream-pose") -> Disn:
     """The shipped network of a part, read once a process."""
     shape = DisnShape.of(kind, variant)
     path = disn_path(shape)

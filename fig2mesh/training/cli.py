@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
 """`fig2mesh.parts.kinds.KINDS`, again, because that imports NumPy."""
 
-VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose", "bone", "bone-two-stream")
+VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
 """Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
 
 BUDGET_MIN = {"pose": 60.0, "size": 3.0, "parts": 45.0}
@@ -61,6 +61,8 @@ def train() -> None:
 @click.option("--joints", type=click.Choice(["16", "21"]), default="21", show_default=True)
 @click.option("--perspective", is_flag=True, help="Perspective drawings: predict x and y too.")
 @click.option("--visibility", is_flag=True, help="Which joints are hidden is an input.")
+@click.option("--limbs/--no-limbs", default=True, show_default=True, help="How foreshortened limbs are is an input.")
+@click.option("--dropout", type=click.FloatRange(0, 0.9), default=0.1, show_default=True, help="The paper: 0.5.")
 @click.option("--metric", is_flag=True, help="Trust the drawing's units, as the paper does.")
 @click.option("--plain", is_flag=True, help="Bodies as they are, from all around: the paper's protocol.")
 @click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N")
@@ -69,12 +71,14 @@ def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device
     from fig2mesh.nets.pose_lift import PoseLiftShape
     from fig2mesh.training.train_pose import pack_skeletons, train_pose
 
-    shape = PoseLiftShape(int(given["joints"]), given["perspective"], given["visibility"], given["metric"])
+    shape = PoseLiftShape(
+        int(given["joints"]), given["perspective"], given["visibility"], given["limbs"], given["metric"]
+    )
     known, held = pack_skeletons(_pack(data))
     _, scores = train_pose(
         known, held, out, shape=shape, augment=not given["plain"], budget_min=_minutes("pose", budget, epochs),
         steps=None if epochs is None else epochs * 100_000 // given["batch"], seed=given["seed"],
-        batch=given["batch"], device=_device(device),
+        dropout=given["dropout"], batch=given["batch"], device=_device(device),
     )  # fmt: skip
     _say({name: value for name, value in scores.items() if "_mean_" not in name})
 

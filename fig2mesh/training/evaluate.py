@@ -14,7 +14,7 @@ import numpy as np
 
 from fig2mesh.nets import part_size, weights
 from fig2mesh.nets.disn import VARIANTS, Disn, DisnShape
-from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, pose_path, read_pose
+from fig2mesh.nets.pose_lift import SHIPPED, PoseLift, PoseLiftShape, pose_path, read_pose
 from fig2mesh.paper import PART_IOU, PART_RMSE, POSE_SCORES, VARIANT_SCORES
 from fig2mesh.parts.kinds import KINDS, PART_KIND
 from fig2mesh.records import BODY_PARTS
@@ -86,14 +86,14 @@ def _pose_table(pack: Pack, runs: Path | None) -> str:
         for perspective in (True, False):
             theirs = POSE_SCORES[joints, perspective]
             name = f"{joints} joints, {'perspective' if perspective else 'orthographic'}"
-            found = _pose_network(runs, PoseLiftShape(joints, perspective, metric=True))
+            found = _pose_network(runs, PoseLiftShape(joints, perspective, limbs=True, metric=True))
             ours = ("not trained", "")
             if found is not None:
                 ours = _pose_cells(pose_scores(found, sample("sides", perspective)))
             rows.append((name, f"{theirs[0]:.2f}", f"{theirs[1]:.2f}", *ours))
     head = ("network of the paper, on four sides", "paper RMSE mm", "paper PCK150 %", "RMSE mm", "PCK150 %")
     first = table(head, rows)
-    shipped, _ = read_pose(pose_path(PoseLiftShape()))
+    shipped, _ = read_pose(pose_path(SHIPPED))
     rows = []
     for view, title in (("sides", "four sides"), ("around", "any side"), ("drawn", "as drawings are")):
         one = sample(view, False)

