@@ -61,7 +61,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, 0.9 * settings.voxel)
         infer = None
         if settings.parts != "outline":
-            infer = part_inference(pose, settings.device)
+            infer = part_inference(pose, settings.part_nodes, settings.device)
         return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device, infer=infer)
 
     def assemble(outline: Outline) -> Body:

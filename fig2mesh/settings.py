@@ -17,6 +17,7 @@ class Settings:
 
     canvas_px : longest side of the raster on which outlines are inflated
     voxel : spacing of the part grids
+    part_nodes : nodes an edge of the grids on which the networks' fields are decoded
     spacing : distance between neighbouring points of the scan
     triangles : of the finest mesh
     texture_size : texels along each side of the square texture
@@ -30,6 +31,7 @@ class Settings:
 
     canvas_px: int = 448
     voxel: float = 0.0075
+    part_nodes: int = 32
     spacing: float = 0.0085
     triangles: int = 20_000
     texture_size: int = 1024
@@ -45,15 +47,15 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "bake
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
 FIRST_USE = {
-    "parts": "lift", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud", "mesher": "solid",
+    "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud", "mesher": "solid",
     "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
 }  # fmt: skip
 """Setting → the first stage that it changes."""
 
 PRESETS: dict[Quality, Settings] = {
-    "draft": Settings(canvas_px=256, voxel=0.01, spacing=0.012, triangles=6_000, texture_size=512),
+    "draft": Settings(canvas_px=256, voxel=0.01, part_nodes=24, spacing=0.012, triangles=6_000, texture_size=512),
     "standard": Settings(),
-    "fine": Settings(canvas_px=768, voxel=0.005, spacing=0.006, triangles=60_000, texture_size=2048),
+    "fine": Settings(canvas_px=768, voxel=0.005, part_nodes=64, spacing=0.006, triangles=60_000, texture_size=2048),
 }
 
 

@@ -25,7 +25,7 @@ from fig2mesh.nets.disn import Disn, Features, as_input
 from fig2mesh.parts.kinds import MIRRORED, PART_KIND
 
 STRIDES: Final = (4, 2, 1)
-BAND: Final = 1.0
+BAND: Final = 0.0
 """Nodes within this many node spacings of the surface are always evaluated."""
 LEAST_SLOPE: Final = 1.2
 """A field steeper than this is expected of no trained network, but measured; a flatter one is not trusted."""

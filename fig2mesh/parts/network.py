@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 MASK = 64
 NODES = 64
+"""The paper's grids (§4.2); depth alone needs fewer, because columns are cut between nodes."""
 
 LEAST_PIXELS = 6
 """Parts of which the drawing shows less count as hidden."""
@@ -48,8 +49,9 @@ def network_parts(
     joints: NDArray[np.float64],
     nets: Mapping[str, Disn],
     sizes: Mapping[str, PartSizeNet],
+    nodes: int = NODES,
 ) -> tuple[PartSdf, ...]:
-    """The fields of all 14 parts on grids of 64 nodes an edge, FIGURE, in the order of their labels.
+    """The fields of all 14 parts on grids of `nodes` nodes an edge, FIGURE, in the order of their labels.
 
     joints : (21, 3) FIGURE
     nets, sizes : networks by kind
@@ -57,7 +59,7 @@ def network_parts(
     from fig2mesh.nets.decode import decode_many
 
     inputs = network_inputs(canvas, divided, joints, sizes)
-    grids = decode_many(nets, {part: (given.mask, given.anchors) for part, given in inputs.items()}, NODES)
+    grids = decode_many(nets, {part: (given.mask, given.anchors) for part, given in inputs.items()}, nodes)
     return tuple(
         PartSdf(
             part, grids[part] * np.float32(given.edge / 2), given.centre.astype(np.float32), given.edge,
@@ -136,14 +138,16 @@ def part_mask(canvas: Canvas, region: BoolArray, centre: NDArray[np.float64], ed
     return np.asarray(ndimage.map_coordinates(image, where, order=1, mode="constant") > 0.5)
 
 
-def part_inference(pose: Pose3D, device: str = "cpu") -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
+def part_inference(
+    pose: Pose3D, nodes: int = NODES, device: str = "cpu"
+) -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
     """`network_parts` with the networks that come with the package, loaded once a process."""
     from fig2mesh.nets import weights
 
     nets = {kind: weights.load(kind).to(device) for kind in KINDS}
     sizes = shipped_sizes()
     joints = pose.joints.astype(np.float64)
-    return lambda canvas, divided: network_parts(canvas, divided, joints, nets, sizes)
+    return lambda canvas, divided: network_parts(canvas, divided, joints, nets, sizes, nodes)
 
 
 def shipped_sizes() -> dict[str, PartSizeNet]:

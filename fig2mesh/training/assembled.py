@@ -142,7 +142,7 @@ def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
     frame = image_frame(truth.figure)
     canvas = make_canvas(truth.figure, frame, settings.canvas_px, 0.9 * settings.voxel)
     pose = lift_by_network(truth.figure, frame)
-    infer = part_inference(pose)
+    infer = part_inference(pose, settings.part_nodes)
     seen, voxel = truth.figure.visible, settings.voxel
     made = dict(
         zip(
