@@ -107,9 +107,11 @@ def size(
 @kinds
 @click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True)
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Times that each part is seen in each view.")
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run in DIR/disn-….")
 def parts(
     data: Path, out: Path, budget: float | None, epochs: int | None, device: str, chosen: tuple[str, ...],
-    variant: str, seed: int,
+    variant: str, seed: int, lr: float, init: Path | None,
 ) -> None:  # fmt: skip
     """Shapes of parts (tables 2 and 3)."""
     from fig2mesh.nets.disn import DisnShape
@@ -119,7 +121,8 @@ def parts(
         click.echo(f"{kind}, {variant}:")
         scores = train_parts(
             data, kind, DisnShape.of(kind, variant), out / f"disn-{kind}-{variant}",
-            budget_min=_minutes("parts", budget, epochs), epochs=epochs, seed=seed, device=_device(device),
+            budget_min=_minutes("parts", budget, epochs), epochs=epochs, seed=seed, device=_device(device), lr=lr,
+            init=None if init is None else init / f"disn-{kind}-{variant}",
         )  # fmt: skip
         _say(scores)
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -48,6 +48,7 @@ def train_parts(
     jitter: float = 0.0,
     validation_bodies: int = 6,
     ema: float = 0.999,
+    init: Path | None = None,
 ) -> dict[str, float]:
     """Train one network on the shards in `data`, going on where an earlier call stopped; returns its scores.
 
@@ -56,6 +57,7 @@ def train_parts(
     lr : learning rate, which falls to a hundredth as a cosine
     mask_mix : shares of whole, visible and empty masks
     jitter : most standard deviation of the joints, PART units; each sample draws its own up to this
+    init : folder with the weights of an earlier run, from which this one starts instead of at random
     validation_bodies : held-out bodies for the final scores
     """
     if kind != shape.kind:
@@ -64,6 +66,10 @@ def train_parts(
     held_out = bool(list(data.glob("valid*.npz")))
     checked = load_parts(data, kind, "valid", max_bodies=CHECKED) if held_out else None
     net = seeded(seed, lambda: Disn(shape)).to(device)
+    before: dict[str, Any] = {}
+    if init is not None:
+        earlier, before = weights.read_disn(weights.disn_path(shape, init))
+        net.load_state_dict(earlier.state_dict())
     optimizer = torch.optim.Adam(net.parameters(), lr=lr, fused=True)
 
     def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
@@ -84,7 +90,7 @@ def train_parts(
         seed=seed, batch=batch, ema=ema, clip=1.0, device=device, amp=True,
         arguments={
             "kind": kind, "variant": shape.variant, "points": points, "parts": len(train), "jitter": jitter,
-            "mask_mix": " ".join(map(str, mask_mix)),
+            "mask_mix": " ".join(map(str, mask_mix)), "init_samples": before.get("samples", 0),
         },
     )  # fmt: skip
     scores: dict[str, float] = {}
@@ -94,7 +100,7 @@ def train_parts(
             scores |= {f"{name}_{which}": value for name, value in found.items()}
     facts = {
         "data": {"parts": len(train), "name": data.name}, "seed": seed, "steps": result.steps,
-        "samples": result.samples, "scores": scores,
+        "samples": before.get("samples", 0) + result.samples, "scores": scores,
     }  # fmt: skip
     weights.save_disn(weights.disn_path(shape, out), net, facts)
     return {**result.metrics, **scores}
