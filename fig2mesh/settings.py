@@ -47,8 +47,8 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "bake
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
 FIRST_USE = {
-    "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud", "mesher": "solid",
-    "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
+    "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
+    "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
 }  # fmt: skip
 """Setting → the first stage that it changes."""
 

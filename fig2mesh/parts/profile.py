@@ -27,6 +27,9 @@ RATIO = (0.25, 6.0)
 OFFSET = 0.12
 """Largest distance of the middle from the bone, FIGURE units."""
 
+FADING = 0.08
+"""Distance over which the inflation takes over where no network reaches, FIGURE units."""
+
 LEAST_COVER = 0.02
 
 
@@ -117,7 +120,9 @@ def measure_profile(
     ratio = average(half**2) / np.maximum(average(reference), 1e-12)
     offset = average(half * middle) / np.maximum(average(half), 1e-12)
     known = average(np.ones_like(half)) > LEAST_COVER
-    _, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
-    # Where no network reaches, what is known nearest goes on.
-    ratio, offset = (ndimage.gaussian_filter(values[tuple(nearest)], blur) for values in (ratio, offset))
-    return Profile(np.clip(ratio, *RATIO), np.clip(offset, -OFFSET, OFFSET))
+    away, nearest = ndimage.distance_transform_edt(~known, sampling=canvas.pitch, return_indices=True)
+    # Beyond what a network knows (a skirt, a hat's brim) what is known nearest fades into the plain inflation.
+    fading = np.exp(-((away / FADING) ** 2))
+    ratio = np.clip(ratio, *RATIO)[tuple(nearest)] ** fading
+    offset = np.clip(offset, -OFFSET, OFFSET)[tuple(nearest)] * fading
+    return Profile(ndimage.gaussian_filter(ratio, blur), ndimage.gaussian_filter(offset, blur))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.kinds import JOINT_MIRROR
-from fig2mesh.pose.network import lift_by_network
+from fig2mesh.pose.network import lift_by_network, upright
 from fig2mesh.records import JOINT, JOINT_NAMES, Figure
 from tests.drawn import JOINTS, draw_figure
 
@@ -58,3 +59,25 @@ def test_the_scale_of_a_drawing_does_not_matter(factor: float) -> None:
     np.testing.assert_allclose(
         lift_joints(load(), factor * drawn), factor * lift_joints(load(), drawn), rtol=1e-3, atol=1e-3 * factor
     )
+
+
+def standing(lean: float) -> NDArray[np.float32]:
+    joints = np.zeros((21, 3), np.float32)
+    for name, (x, y) in JOINTS.items():
+        joints[JOINT[name]] = ((x - 100) / 140, (160 - y) / 140, 0)
+    joints[:, 2] += lean * joints[:, 1]
+    return joints
+
+
+@pytest.mark.parametrize("lean", [-0.2, 0.0, 0.3])
+def test_a_standing_figure_is_upright(lean: float) -> None:
+    np.testing.assert_allclose(upright(standing(lean)), standing(0.0), atol=1e-6)
+
+
+def test_a_seated_figure_keeps_its_depths() -> None:
+    joints = standing(0.0)
+    for side in "lr":
+        # Thighs come forward to the viewer, shins hang down.
+        for name in ("knee", "ankle", "foot"):
+            joints[JOINT[f"{side}_{name}"]] += (0, 0.35, 0.4)
+    np.testing.assert_array_equal(upright(joints), joints)
