@@ -118,10 +118,13 @@ def _layer_profile(
     if not own:
         return None
     front, back = column_extents(canvas, own)
-    seen = np.isfinite(front)
+    # Where the layer goes on without a network (cloth, hair), so does what is inflated for comparison: inflation sinks
+    # towards an end, and a network's part that is cut off there does not.
+    unknown = layer.region & ~np.isin(layer.labels, [field.part for field in own])
+    covered = np.isfinite(front) | unknown
     _, nearest = ndimage.distance_transform_edt(~layer.region, return_indices=True)
-    whole = replace(layer, region=seen, labels=layer.labels[tuple(nearest)])
-    reference = inflate(seen, _load(canvas, whole, loads), device) * canvas.pitch**2
+    whole = replace(layer, region=covered, labels=layer.labels[tuple(nearest)])
+    reference = inflate(covered, _load(canvas, whole, loads), device) * canvas.pitch**2
     bone = mid_surface(canvas, points, depth)
     return measure_profile(canvas, layer.region, front, back, reference, bone)
 

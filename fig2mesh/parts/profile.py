@@ -21,8 +21,8 @@ from fig2mesh.records import PartSdf
 SMOOTHNESS = 0.022
 """Spread of the average over neighbouring columns, FIGURE units: finer detail of a network is noise."""
 
-RATIO = (0.25, 6.0)
-"""Bounds of the squared thickness relative to the inflation: half as thick to two and a half times."""
+RATIO = (0.25, 2.5)
+"""Bounds of the squared thickness relative to the inflation: half as thick to one and a half times."""
 
 OFFSET = 0.12
 """Largest distance of the middle from the bone, FIGURE units."""
