@@ -95,6 +95,12 @@ def evaluate(
     if out is None:
         click.echo(report, nl=False)
         return
+    if runs is not None:
+        from fig2mesh.training.curves import plot_runs
+
+        curves = out.with_suffix(".png")
+        if plot_runs(runs, curves):
+            report += f"\n## Learning curves\n\n![Scores on held-out bodies while training]({curves.name})\n"
     partial = out.with_name(f".{out.name}.partial")
     partial.write_text(report, encoding="utf-8")
     partial.replace(out)
