@@ -21,7 +21,7 @@ from fig2mesh.nets.disn import Disn, DisnShape
 
 FOLDER: Final = Path(__file__).resolve().parent.parent / "weights"
 KEY: Final = "fig2mesh"
-REINSTALL: Final = "install fig2mesh again, or train the network: `fig2mesh train`"
+REINSTALL: Final = "install fig2mesh again; docs/training.md says how weights are made"
 
 
 def save(path: Path, state: Mapping[str, Tensor], facts: Mapping[str, Any]) -> None:

@@ -1,10 +1,10 @@
-"""Part fields from the outline alone: the road without networks.
+"""Part fields with the drawn outline: from rules alone, or with the cross-sections that networks infer.
 
 The silhouette is split into layers by the skeleton (`split`), each layer's completed outline is inflated
 (`inflate`) around a middle surface that follows the 3D joints (`depth`), and the parts are cut out of the layers
 with some overlap. Parts of one layer share one surface, so that their union has no seam at a joint.
 
-It is the baseline for the networks of paper §4.2 and an oracle for tests: no weights are needed.
+Without networks it is their baseline, and an oracle for tests: no weights are needed.
 """
 
 from __future__ import annotations

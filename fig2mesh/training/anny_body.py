@@ -31,7 +31,6 @@ SHAPES = 28
 """Principal shapes kept; the rest is below 2 mm at 95 % of the vertices (measured when the pack is built)."""
 
 SAMPLED_SHAPES = 320
-AGES = (0.0, 1.0)
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,8 @@ def truth_of(subject: Subject, seed: int = 0) -> Truth:
 def chamfer(body: Body, truth: Truth, spacing: float = 0.012) -> tuple[float, float]:
     """Mean distance between the surfaces, both ways averaged, FIGURE units; and the depth shift that was taken out.
 
-    A drawing says nothing of how far away its figure stands, so the mean depths are made equal first.
+    A drawing says nothing of how far away its figure stands: it is shifted to where the medians of depth agree, and of
+    five places about that the best is taken.
     """
     from scipy.spatial import cKDTree
 

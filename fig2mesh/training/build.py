@@ -7,12 +7,13 @@ import json
 import multiprocessing
 import os
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fig2mesh.errors import FigureError
 from fig2mesh.training.pack import Pack, load_pack
@@ -71,12 +72,28 @@ def build(
             report(done := done + 1, len(tasks))
 
 
-def shards(data: Path, split: str) -> list[Path]:
-    """The shards of a split in order; an error where there are none."""
-    found = sorted(data.glob(f"{split}-?????.npz"))
+def shards(data: Path, *splits: str) -> list[Path]:
+    """The shards of some splits in order; an error where there are none."""
+    found = [path for split in splits for path in sorted(data.glob(f"{split}-?????.npz"))]
     if not found:
-        raise FigureError(data, f"holds no {split} data", "make it with: fig2mesh data build")
+        raise FigureError(data, f"holds no {' or '.join(splits)} data", "make it with: fig2mesh data build")
     return found
+
+
+def read_shard(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """Some arrays of a shard."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in names}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        found = f"no readable shard ({' '.join(str(error).split())[:80]})"
+        raise FigureError(path, found, "make it anew with: fig2mesh data build") from None
+
+
+def recipe_digest(data: Path) -> str:
+    """What tells one folder of data from another: 16 hexadecimal digits of its recipe."""
+    path = data / RECIPE
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else ""
 
 
 def _check_recipe(out: Path, recipe: dict[str, Any]) -> None:
@@ -100,7 +117,7 @@ def _complete(path: Path, rows: int) -> bool:
         return False
     try:
         with np.load(path, allow_pickle=False) as archive:
-            return len(archive["seed"]) == rows
+            return len(archive["seed"]) >= rows
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return False
 

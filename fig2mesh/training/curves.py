@@ -7,12 +7,15 @@ from pathlib import Path
 
 
 def plot_runs(runs: Path, out: Path) -> bool:
-    """Draw the validation scores of all runs under a folder over the samples seen; False where there are none.
+    """Draw the scores on held-out bodies of all runs under a folder over the samples seen; False where there are none.
 
     Part networks: mean error of the distance at stored points of held-out bodies; pose networks: RMSE.
+    False as well where matplotlib is missing.
     """
-    import matplotlib
-
+    try:
+        import matplotlib
+    except ImportError:
+        return False
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
@@ -32,9 +35,12 @@ def plot_runs(runs: Path, out: Path) -> bool:
         axis.set(title=title, xlabel="samples", yscale="log")
         axis.legend(fontsize=7, ncols=2)
         axis.grid(alpha=0.3, which="both")
+    if not drawn:
+        pyplot.close(figure)
+        return False
     figure.tight_layout()
     partial = out.with_name(f".partial-{out.name}")
     figure.savefig(partial, dpi=80)
     pyplot.close(figure)
     partial.replace(out)
-    return drawn
+    return True

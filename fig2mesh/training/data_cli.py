@@ -65,8 +65,13 @@ def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, seed: 
 @click.argument("source", type=click.Path(path_type=Path), metavar="DATA")
 @click.option("-o", "--output", "out", type=FILE, required=True, metavar="PNG")
 @click.option("--count", type=click.IntRange(1, 200), default=24, show_default=True, metavar="N", help="Bodies shown.")
-def show(source: Path, out: Path, count: int) -> None:
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def show(source: Path, out: Path, count: int, overwrite: bool) -> None:
     """A contact sheet of samples."""
+    from fig2mesh.errors import OutputError
+
+    if out.exists() and not overwrite:
+        raise OutputError(out, "exists", "pass --overwrite or another file")
     from fig2mesh.training.sheet import make_sheet
 
     make_sheet(source, out, count)
@@ -84,13 +89,18 @@ def evaluate(
     pack: Path, source: Path, runs: Path | None, bodies: int, figures: int, out: Path | None, overwrite: bool
 ) -> None:
     """The paper's tables beside ours, on clips and people that training never saw."""
-    from fig2mesh.errors import OutputError
+    from fig2mesh.errors import InputError, OutputError
     from fig2mesh.training.evaluate import Limits
     from fig2mesh.training.evaluate import evaluate as measure
     from fig2mesh.training.pack import load_pack
 
-    if out is not None and out.exists() and not overwrite:
-        raise OutputError(out, "exists", "pass --overwrite or another file")
+    if runs is not None and not runs.is_dir():
+        raise InputError("--runs", f"no folder {runs}", "name the folder that train wrote to, or leave it out")
+    for path in () if out is None else (out, out.with_suffix(".png")):
+        if path.exists() and not overwrite:
+            raise OutputError(path, "exists", "pass --overwrite or another file")
+    if out is not None:
+        out.parent.mkdir(parents=True, exist_ok=True)
     report = measure(load_pack(pack), source, runs, Limits(bodies, figures), lambda line: click.echo(line, err=True))
     if out is None:
         click.echo(report, nl=False)

@@ -9,12 +9,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.errors import InputError
 from fig2mesh.parts.kinds import ANCHORS, MIRRORED, PART_KIND, anchor_joints
+from fig2mesh.training.build import read_shard, shards
 
 VIEWS: Final = 4
 """Front, left, back, right: yaw 0, 90, 180, 270 degrees."""
 MASKS: Final = ("amodal", "visible")
+HELD_OUT: Final = ("valid-clips", "valid-characters")
 MIRROR: Final = np.array((-1, 1, 1), np.float32)
 VIEW_IN_MIRROR: Final = [0, 3, 2, 1]
 """The mirror image of a figure seen from its left is the mirror image of its view from the right."""
@@ -81,22 +82,17 @@ def load_parts(
     split : "train", "valid-clips", "valid-characters", or "valid" for both
     grid, points : whether the dense fields and the point samples are read
     """
-    shards = sorted(data.glob(f"{split}*.npz"))
-    if not shards:
-        raise InputError(data, f"no shards {split}*.npz", "build the data: `fig2mesh data build`")
+    splits = HELD_OUT if split == "valid" else (split,)
     labels = [label for label, name in PART_KIND.items() if name == kind]
     rows: dict[str, list[NDArray[np.generic]]] = {
         name: [] for name in ("anchors", "points", "distance", "masks", "grid", "body")
     }
     bodies = 0
-    for shard in shards:
+    for shard in shards(data, *splits):
         if max_bodies is not None and bodies >= max_bodies:
             break
-        with np.load(shard) as stored:
-            names = ("joints", "centre", "edge", "mask_amodal", "mask_visible")
-            loaded = {name: stored[name] for name in names}
-            loaded |= {name: stored[name] for name in ("points", "distance") if points}
-            loaded |= {"grid": stored["grid"]} if grid else {}
+        names = ["joints", "centre", "edge", "mask_amodal", "mask_visible"]
+        loaded = read_shard(shard, [*names, *(["points", "distance"] if points else []), *(["grid"] if grid else [])])
         count = len(loaded["joints"])
         if max_bodies is not None:
             count = min(count, max_bodies - bodies)

@@ -6,6 +6,8 @@ depth of the front; visible masks of some parts; its skeleton.
 
 from __future__ import annotations
 
+import os
+import zipfile
 from pathlib import Path
 from typing import Any, Final
 
@@ -54,7 +56,9 @@ def make_sheet(data: Path, out: Path, count: int = 24) -> Path:
     out = Path(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        Image.fromarray(np.clip(np.rint(sheet), 0, 255).astype(np.uint8)).save(out)
+        partial = out.with_name(f".{out.name}.partial")
+        Image.fromarray(np.clip(np.rint(sheet), 0, 255).astype(np.uint8)).save(partial, format="PNG")
+        os.replace(partial, out)
     except (OSError, ValueError) as error:
         raise OutputError(
             out, f"the sheet cannot be written ({error})", "name a .png file in a folder of yours"
@@ -164,13 +168,13 @@ def _fit(picture: Picture) -> Picture:
 
 def _bodies(data: Path, count: int) -> list[Body]:
     """At most `count` bodies, spread evenly over the shards."""
-    shards = sorted(data.glob("*.npz")) if data.is_dir() else [data]
+    shards = sorted(data.glob("*-?????.npz")) if data.is_dir() else [data]
     sizes = []
     for shard in shards:
         try:
             with np.load(shard) as file:
                 sizes.append(len(file["joints"]))
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
             raise InputError(shard, f"no training data can be read from it ({error})", REMEDY) from error
     total = sum(sizes)
     if not total or count < 1:

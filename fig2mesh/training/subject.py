@@ -98,7 +98,7 @@ def _posed_skirt(anny: AnnyBodies, skirt: NDArray[np.float64], bones: Posture) -
 
 
 def _dressed(pack: Pack, unseen: bool, rng: np.random.Generator) -> tuple[Rig, NDArray[np.float64] | None, str]:
-    """An anny body of random shape in random clothes; of unseen people at least one garment was never trained on."""
+    """An anny body of random shape in random clothes; of unseen people in such as were never trained on."""
     anny = pack.anny
     amount = np.clip(rng.normal(size=len(anny.shapes)), -2.2, 2.2)
     moved = np.tensordot(amount, anny.shapes, axes=1)

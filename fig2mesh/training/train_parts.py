@@ -21,6 +21,7 @@ from torch import Tensor, nn
 from fig2mesh.nets import weights
 from fig2mesh.nets.decode import decode, decode_dense
 from fig2mesh.nets.disn import Disn, DisnShape, as_input
+from fig2mesh.training.build import recipe_digest
 from fig2mesh.training.loop import run_loop, seeded
 from fig2mesh.training.part_data import MIRROR, VIEWS, PartData, load_parts, swapped, turned, turned_grid
 
@@ -89,7 +90,8 @@ def train_parts(
         model=net, optimizer=optimizer, step=step, folder=out, validate=validate, budget_min=budget_min, steps=steps,
         seed=seed, batch=batch, ema=ema, clip=1.0, device=device, amp=True,
         arguments={
-            "kind": kind, "variant": shape.variant, "points": points, "parts": len(train), "jitter": jitter,
+            "kind": kind, "variant": shape.variant, "points": points, "parts": len(train),
+            "data": recipe_digest(data), "jitter": jitter,
             "mask_mix": " ".join(map(str, mask_mix)), "init_samples": before.get("samples", 0),
         },
     )  # fmt: skip

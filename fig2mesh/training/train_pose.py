@@ -8,6 +8,7 @@ distance is that of depths.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -89,7 +90,8 @@ def train_pose(
         seed=seed, batch=batch, warmup=200, clip=1.0, device=device, amp=amp, validations=10,
         arguments={"joints": shape.joints, "perspective": shape.perspective, "visibility": shape.visibility,
                    "metric": shape.metric, "width": shape.width, "augment": augment,
-                   "limbs": shape.limbs, "dropout": dropout},
+                   "limbs": shape.limbs, "dropout": dropout,
+                   "data": hashlib.sha256(train.rotations.tobytes() + train.reach.tobytes()).hexdigest()[:16]},
     )  # fmt: skip
     scores = {
         f"{name}_{score}": value

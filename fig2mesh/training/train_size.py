@@ -22,7 +22,7 @@ from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.nets.part_size import OUTPUTS, PartSizeNet, SizeShape, bone_unit, save_size, size_path
 from fig2mesh.parts.kinds import MIRRORED, PART_KIND, anchor_joints
 from fig2mesh.records import _Checked
-from fig2mesh.training.build import shards
+from fig2mesh.training.build import read_shard, recipe_digest, shards
 from fig2mesh.training.loop import run_loop, seeded
 
 BATCH: Final = 512
@@ -66,9 +66,7 @@ def read_sizes(data: Path, split: str, kind: str) -> PartSizes:
     """The parts of a kind in all shards of a split."""
     columns: list[tuple[NDArray[np.float64], ...]] = []
     for path in shards(data, split):
-        with np.load(path, allow_pickle=False) as shard:
-            names = ("joints", "centre", "edge", "size", "mask_amodal", "mask_visible")
-            arrays = {name: shard[name] for name in names}
+        arrays = read_shard(path, ("joints", "centre", "edge", "size", "mask_amodal", "mask_visible"))
         for part in (part for part, own in PART_KIND.items() if own == kind):
             for view, yaw in enumerate(VIEW_YAW_DEG.values()):
                 columns.append(_part(arrays, part, view, axes(yaw)))
@@ -150,7 +148,7 @@ def train_size(
     result = run_loop(
         model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
         seed=seed, batch=batch, clip=1.0, device=device, amp=False,
-        arguments={"kind": kind, "data": data.name, "parts": len(known.size)},
+        arguments={"kind": kind, "data": recipe_digest(data), "parts": len(known.size)},
     )  # fmt: skip
     scores = {
         f"{split}_{name}": value for split, columns in held.items() for name, value in size_scores(net, columns).items()

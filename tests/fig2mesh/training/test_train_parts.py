@@ -35,7 +35,7 @@ def test_left_and_mirrored_right_parts_are_read(data):
     assert len(load_parts(data, "hand", "train", max_bodies=1)) == 2
     # Right hands point to the figure's right, and in the mirror to the left like the others.
     assert (parts.anchors[:, 1, 0] > parts.anchors[:, 0, 0]).all()
-    with pytest.raises(InputError, match="no shards"):
+    with pytest.raises(InputError, match="holds no test data"):
         load_parts(data, "hand", "test")
 
 
