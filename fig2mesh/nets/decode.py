@@ -5,8 +5,8 @@ within `band` node spacings of it: a distance field changes by at most L a unit,
 further than L half diagonals from zero has none. L is measured in each cell's neighbourhood, with a reserve. What
 remains is interpolated: its sign is certain as far as L is, and it is further than `band` spacings from the surface.
 
-Measured with networks for hands after a minute of training, whose fields are still rough: 29 % of the nodes evaluated,
-no sign differs, 0.64 s a part (dense 1.99) with two streams and pose points, one core.
+Measured with the shipped networks on the 14 parts of a drawing, 64 nodes an edge, two cores: 21 % of the nodes
+evaluated, 3.0 s; every node 13.0 s.
 
 Local features depend on (x, y) only: their share of the decoder's first layer is computed once a pixel of the grid.
 """
