@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from fig2mesh.evaluate_cli import evaluate
+
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
@@ -75,45 +77,6 @@ def show(source: Path, out: Path, count: int, overwrite: bool) -> None:
     from fig2mesh.training.sheet import make_sheet
 
     make_sheet(source, out, count)
-
-
-@click.command()
-@click.option("--pack", type=FILE, required=True, metavar="FILE", help="What `data pack` made.")
-@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help="What `data build` made.")
-@click.option("--runs", type=FOLDER, metavar="DIR", help="What `train` made: networks that are not shipped.")
-@click.option("--bodies", type=click.IntRange(1), default=32, show_default=True, metavar="N", help="Dense fields.")
-@click.option("--figures", type=click.IntRange(1), default=12, show_default=True, metavar="N", help="Whole drawings.")
-@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
-def evaluate(
-    pack: Path, source: Path, runs: Path | None, bodies: int, figures: int, out: Path | None, overwrite: bool
-) -> None:
-    """The paper's tables beside ours, on clips and people that training never saw."""
-    from fig2mesh.errors import InputError, OutputError
-    from fig2mesh.training.evaluate import Limits
-    from fig2mesh.training.evaluate import evaluate as measure
-    from fig2mesh.training.pack import load_pack
-
-    if runs is not None and not runs.is_dir():
-        raise InputError("--runs", f"no folder {runs}", "name the folder that train wrote to, or leave it out")
-    for path in () if out is None else (out, out.with_suffix(".png")):
-        if path.exists() and not overwrite:
-            raise OutputError(path, "exists", "pass --overwrite or another file")
-    if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    report = measure(load_pack(pack), source, runs, Limits(bodies, figures), lambda line: click.echo(line, err=True))
-    if out is None:
-        click.echo(report, nl=False)
-        return
-    if runs is not None:
-        from fig2mesh.training.curves import plot_runs
-
-        curves = out.with_suffix(".png")
-        if plot_runs(runs, curves):
-            report += f"\n## Learning curves\n\n![Scores on held-out bodies while training]({curves.name})\n"
-    partial = out.with_name(f".{out.name}.partial")
-    partial.write_text(report, encoding="utf-8")
-    partial.replace(out)
 
 
 def add_to(cli: click.Group) -> None:

@@ -44,7 +44,7 @@ def evaluate(pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(
     """
     sections = [
         "# Evaluation",
-        "Written by `fig2mesh evaluate`; [training.md](training.md) says how data and weights were made. "
+        "Written by `fig2mesh evaluate networks`; [training.md](training.md) says how data and weights were made. "
         f"Part fields: {limits.bodies} bodies of each held-out split, each part from one of four sides, by turns; "
         f"whole figures: {limits.figures} of each.",
     ]

@@ -22,7 +22,10 @@ REFUSED = {
     "build, no output": (["data", "build", "--pack", "there"], "--output"),
     "show, no data": (["data", "show", "none", "-o", "sheet.png"], "none"),
     "show, other file": (["data", "show", "there", "-o", "sheet.png"], "there"),
-    "evaluate, there already": (["evaluate", "--pack", "p", "--data", "d", "-o", "there"], "there: exists"),
+    "evaluate networks, there already": (
+        ["evaluate", "networks", "--pack", "p", "--data", "d", "-o", "there"],
+        "there: exists",
+    ),
 }
 
 
