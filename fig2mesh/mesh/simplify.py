@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fig2mesh.mesh.slivers import LEAST_QUALITY, triangle_quality, without_slivers
 from fig2mesh.mesh.topology import (
     as_mesh,
     check_solid,
@@ -43,14 +44,23 @@ def simplify(mesh: Mesh, triangles: int) -> Mesh:
     """Reduce a closed, oriented manifold to about `triangles` triangles; components, genus and orientation stay.
 
     Components share the budget by area, and none gets fewer than 64. Where no way of simplifying reaches a component's
-    share without breaking a law, it keeps as many triangles as it must; a mesh that is small enough is returned as is.
+    share without breaking a law, it keeps as many triangles as it must; a mesh that is small enough keeps them all.
+    Either way slivers are exchanged at the end (`fig2mesh.mesh.slivers`); what has none is returned as is.
     """
     if len(mesh.faces) <= triangles:
-        return mesh
+        return _improved(mesh)
     labels = face_components(mesh.faces)
     budgets = _budgets(component_areas(mesh, labels), np.bincount(labels), triangles)
     pieces = [select_faces(mesh, labels == number) for number in range(len(budgets))]
-    return join([_simplify_piece(piece, int(budget)) for piece, budget in zip(pieces, budgets, strict=True)])
+    return join([_improved(_simplify_piece(piece, int(budget))) for piece, budget in zip(pieces, budgets, strict=True)])
+
+
+def _improved(mesh: Mesh) -> Mesh:
+    """Without slivers, as far as that adds no fold; a mesh that is no solid is left alone."""
+    if not (triangle_quality(mesh.vertices, mesh.faces) < LEAST_QUALITY).any() or not check_solid(mesh).solid:
+        return mesh
+    better = without_slivers(mesh)
+    return better if _folds(better) <= _folds(mesh) else mesh
 
 
 def _budgets(areas: NDArray[np.float64], sizes: NDArray[Any], triangles: int) -> NDArray[np.int64]:
@@ -135,13 +145,13 @@ def _one_way(mesh: Mesh, target: Mesh) -> tuple[float, float]:
     scene = open3d.t.geometry.RaycastingScene()
     tensor: Any = open3d.core.Tensor
     scene.add_triangles(tensor(target.vertices.copy()), tensor(target.faces.astype(np.uint32)))
-    points = np.concatenate([_spread(mesh), mesh.vertices])
+    points = np.concatenate([spread(mesh)[0], mesh.vertices])
     distances = scene.compute_distance(tensor(points)).numpy()
     return float(distances[:SAMPLES].mean(dtype=np.float64)), float(distances.max())
 
 
-def _spread(mesh: Mesh) -> FloatArray:
-    """(SAMPLES, 3) points spread evenly over a mesh; always the same ones."""
+def spread(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int64]]:
+    """(SAMPLES, 3) points spread evenly over a mesh and the (SAMPLES,) faces they lie on; always the same ones."""
     ends = np.cumsum(face_areas(mesh))
     step = (np.arange(SAMPLES) + 0.5) / SAMPLES
     face = np.minimum(np.searchsorted(ends, step * ends[-1]), len(ends) - 1)
@@ -150,4 +160,4 @@ def _spread(mesh: Mesh) -> FloatArray:
     outer = np.sqrt(first)
     weights = np.stack([1 - outer, outer * (1 - second), outer * second], axis=1)
     points = np.einsum("nk,nkd->nd", weights, mesh.vertices[mesh.faces[face]])
-    return np.ascontiguousarray(points, np.float32)
+    return np.ascontiguousarray(points, np.float32), face
