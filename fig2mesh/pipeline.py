@@ -65,7 +65,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device, infer=infer)
 
     def assemble(outline: Outline) -> Body:
-        return Body(outline.parts)
+        return Body(outline.parts, fillets=outline.fillets)
 
     def scan_body(body: Body) -> PointCloud:
         return scan(body, spacing=settings.spacing, seed=settings.seed)

@@ -23,6 +23,7 @@ class Body:
     parts : any number of grids, each with its own place, edge and number of nodes
     smooth : (first, second, radius) for pairs of indices into `parts` that melt together; radius in FIGURE units.
         Fillets are grids computed once, so parts not named here keep their creases and cost nothing.
+    fillets : (first, second, grid), fillets made elsewhere
 
     Distance outside of a part's cube: with b the distance to the cube and v the value at its nearest point,
     sqrt(b^2 + max(v, 0)^2). It continues v without a step, never exceeds the true distance where v does not, and is
@@ -32,6 +33,7 @@ class Body:
 
     parts: tuple[PartSdf, ...]
     smooth: tuple[tuple[int, int, float], ...] = ()
+    fillets: tuple[tuple[int, int, PartSdf], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))
@@ -52,6 +54,9 @@ class Body:
             if fillet is not None:
                 grids.append(fillet)
                 owners.append((first, second))
+        for first, second, fillet in self.fillets:
+            grids.append(fillet)
+            owners.append((first, second))
         return pack(grids, owners)
 
     @cached_property

@@ -112,7 +112,7 @@ class PoseLiftShape:
         return self.joints * (3 if self.visibility else 2) + (2 * len(self.bones) if self.limbs else 0)
 
 
-SHIPPED: Final = PoseLiftShape(limbs=True)
+SHIPPED: Final = PoseLiftShape(visibility=True, limbs=True)
 """The network for drawn figures."""
 
 

@@ -21,6 +21,9 @@ LEAST_CONTOUR_PX = 256
 
 MARGIN_PX = 4
 
+PINHOLE = 0.005
+"""Holes that are smaller than a square of this side are filled, share of the figure's longer side."""
+
 HAIR_PX = 0.9
 """Half the width of the thinnest stroke, pixels of the contour's raster."""
 
@@ -79,6 +82,7 @@ def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: fl
     solid = cover >= 0.5
     if not solid.any():
         solid = cover >= cover.max()
+    solid = _without_pinholes(solid)
     distance = ndimage.distance_transform_edt(~solid) - ndimage.distance_transform_edt(solid)
     distance = ndimage.gaussian_filter(distance - 0.5 * np.sign(distance), 0.7)
     # Smoothing by itself breaks lines of one pixel, hence the least radius.
@@ -101,6 +105,16 @@ def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: fl
     first = np.array([(column[0] + 0.5) / scale - pad, (row[0] + 0.5) / scale - pad])
     x, y = frame.figure_from_image(first)
     return Canvas((sampled + beyond) * units, labels, (float(x), float(y)), float(step * units))
+
+
+def _without_pinholes(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Holes of a few pixels are faults of a mask; solids would have tunnels there."""
+    holes, count = ndimage.label(~solid)
+    sizes = np.bincount(holes.ravel(), minlength=count + 1)
+    limit = (PINHOLE * max(np.ptp(np.nonzero(solid), axis=1))) ** 2
+    small = sizes <= limit
+    small[0] = False
+    return np.asarray(solid | small[holes])
 
 
 def _contour_raster(mask: NDArray[np.bool_]) -> tuple[NDArray[np.float32], float]:

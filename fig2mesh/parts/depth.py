@@ -19,7 +19,7 @@ REST = 0.35
 what touches in the drawing is joined in space."""
 
 SOFTNESS = 0.03
-"""Distance at which two bones' depths mix evenly, FIGURE units."""
+"""Distance within which a bone's depth holds, FIGURE units; also the spread of the smoothing after."""
 
 
 def mid_surface(canvas: Canvas, points: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -37,7 +37,7 @@ def mid_surface(canvas: Canvas, points: NDArray[np.float64], depth: NDArray[np.f
     distance2 = ((coarse[..., None, :] - points) ** 2).sum(axis=-1)
     weight = (distance2 + SOFTNESS**2) ** -2.0
     values = (weight * depth).sum(axis=-1) / weight.sum(axis=-1)
-    values = ndimage.gaussian_filter(values, 1.0, mode="nearest")
+    values = ndimage.gaussian_filter(values, SOFTNESS / (STRIDE * canvas.pitch), mode="nearest")
     rows, columns = np.arange(height) / STRIDE, np.arange(width) / STRIDE
     grid = np.meshgrid(rows, columns, indexing="ij")
     fine = ndimage.map_coordinates(values, grid, order=3, mode="nearest")

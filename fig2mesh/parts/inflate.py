@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-3
 """Residual relative to the right-hand side at which the solver stops; 0.1 % of u is 0.05 % of the thickness."""
 
+LEAST_SHARE = 0.05
+"""A rim nearer to a pixel centre counts as this near, pixels: the equations stay well conditioned."""
+
 COARSEST_PX = 24
 MOST_ITERATIONS = 400
 
@@ -43,7 +46,12 @@ def single_threaded() -> Iterator[None]:
         torch.set_num_threads(threads)
 
 
-def inflate(inside: NDArray[np.bool_], load: NDArray[np.float64], device: str = "cpu") -> NDArray[np.float64]:
+def inflate(
+    inside: NDArray[np.bool_],
+    load: NDArray[np.float64],
+    device: str = "cpu",
+    distance: NDArray[np.float64] | None = None,
+) -> NDArray[np.float64]:
     """Solve −Δu = load on the pixels `inside`, u = 0 elsewhere.
 
     Parameters
@@ -51,6 +59,8 @@ def inflate(inside: NDArray[np.bool_], load: NDArray[np.float64], device: str = 
     inside : (H, W) bool
     load : (H, W), positive
     device : PyTorch device
+    distance : (H, W) signed distance in any unit, negative inside: where between pixel centres the rim lies; without it
+        the rim runs through the outermost pixels outside, and u carries their stairs far into the outline
 
     Returns
     -------
@@ -65,15 +75,33 @@ def inflate(inside: NDArray[np.bool_], load: NDArray[np.float64], device: str = 
     window = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     domain = torch.from_numpy(np.pad(inside[window], 1).astype(np.float32)).to(device)
     force = torch.from_numpy(np.pad(load[window], 1).astype(np.float32)).to(device)
+    own = np.full(domain.shape, 4.0)
+    if distance is not None:
+        own[1:-1, 1:-1] = _own_weight(inside, distance)[window]
     with single_threaded():
-        solution = _solve(domain, force * domain)
+        solution = _solve(domain, force * domain, torch.from_numpy(own.astype(np.float32)).to(device))
     result[window] = solution[1:-1, 1:-1].double().cpu().numpy()
     return np.maximum(result, 0.0)
 
 
-def _laplacian(u: torch.Tensor, domain: torch.Tensor) -> torch.Tensor:
+def _own_weight(inside: NDArray[np.bool_], distance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(H, W) weight of each pixel itself in −Δu: a rim nearer than the next pixel holds it more firmly.
+
+    The symmetric scheme of Gibou et al. (2002), second order in the place of the rim.
+    """
+    weight = np.full(inside.shape, 4.0)
+    for axis in (0, 1):
+        for step in (1, -1):
+            beyond = np.roll(distance, step, axis)
+            share = distance / np.minimum(distance - beyond, -1e-12)
+            leaves = inside & ~np.roll(inside, step, axis)
+            weight[leaves] += 1.0 / np.clip(share, LEAST_SHARE, 1.0)[leaves] - 1.0
+    return weight
+
+
+def _laplacian(u: torch.Tensor, domain: torch.Tensor, own: torch.Tensor | float = 4.0) -> torch.Tensor:
     """−Δu for u that vanishes outside the domain and on the raster's border."""
-    out = 4.0 * u
+    out = own * u
     out[1:] -= u[:-1]
     out[:-1] -= u[1:]
     out[:, 1:] -= u[:, :-1]
@@ -81,7 +109,7 @@ def _laplacian(u: torch.Tensor, domain: torch.Tensor) -> torch.Tensor:
     return out * domain
 
 
-def _solve(domain: torch.Tensor, force: torch.Tensor) -> torch.Tensor:
+def _solve(domain: torch.Tensor, force: torch.Tensor, own: torch.Tensor | float = 4.0) -> torch.Tensor:
     import torch
     from torch.nn import functional
 
@@ -93,14 +121,14 @@ def _solve(domain: torch.Tensor, force: torch.Tensor) -> torch.Tensor:
         coarse = _solve(coarse_domain, 4.0 * pooled[1] / pooled[0].clamp(min=1e-6) * coarse_domain)
         fine = functional.interpolate(coarse[None, None], scale_factor=2, mode="bilinear", align_corners=False)
         guess = fine[0, 0, : domain.shape[0], : domain.shape[1]] * domain
-    residual = force - _laplacian(guess, domain)
+    residual = force - _laplacian(guess, domain, own)
     direction = residual.clone()
     energy = torch.sum(residual * residual)
     limit = TOLERANCE**2 * float(torch.sum(force * force))
     for _ in range(MOST_ITERATIONS):
         if float(energy) <= limit:
             break
-        image = _laplacian(direction, domain)
+        image = _laplacian(direction, domain, own)
         step = energy / torch.sum(direction * image)
         guess = guess + step * direction
         residual = residual - step * image

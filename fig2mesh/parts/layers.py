@@ -8,22 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.parts.bones import Bones, core_bones, out_of_cloth
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.depth import mid_surface, place_limb
+from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
-from fig2mesh.parts.profile import Profile, column_extents, measure_profile
-from fig2mesh.parts.split import Layer, Split
+from fig2mesh.parts.profile import Profile, measure_profile
+from fig2mesh.parts.rim import RIM_BLUR, extended, raster_distance, rim_distance
+from fig2mesh.parts.split import Layer, Split, closing
 from fig2mesh.records import JOINT, PART, PART_NAMES, PartSdf
 
-LOAD = {"torso": 0.95, "head": 3.0, "garment": 1.1, "foot": 2.2, "limb": 2.0}
+LOAD = {"torso": 0.95, "head": 2.6, "garment": 1.1, "foot": 2.2, "limb": 2.0}
 """Right-hand side of the inflation by kind of part: 2 makes a strip as deep as wide, 1 about 0.7 times; a torso is
 two thirds as deep as wide, a head nearly a ball."""
 
 FRONTAL_FOOT = 4.0
 """What a foot that points to the viewer has on top of that: it is longer than the drawing shows it wide."""
 
+
+STANDING = 0.12
+"""Feet whose tip is at most this far above the lowest point of the figure stand on the ground, FIGURE units."""
+
+NOOK = 0.045
+"""Nooks of a head's outline up to twice this wide do not show in its depth, FIGURE units."""
 
 ATTEMPTS = 6
 """Each brings floating limbs half way back to the middle of the body; the last one all the way."""
@@ -39,11 +48,13 @@ class LayerSurface:
     u : (H, W) float64, squared half thickness in FIGURE units², negative outside the outline
     z0 : (H, W) float64, FIGURE z of its middle
     labels : (H, W) uint8, part of each pixel, 0 outside the region
+    clip : (H, W) float64, signed distance to flat ends, positive beyond them, FIGURE units; None where there are none
     """
 
     u: NDArray[np.float64]
     z0: NDArray[np.float64]
     labels: NDArray[np.uint8]
+    clip: NDArray[np.float64] | None = None
 
 
 def raise_layers(
@@ -64,69 +75,129 @@ def raise_layers(
     """
     loads = part_loads(joints)
     core, *others = divided.layers
-    points, depth = _trunk(divided, joints)
-    profiles = {
-        layer.name: _layer_profile(canvas, layer, *bones, loads, device, fields)
-        for layer, bones in [(core, (points, depth)), *((x, (x.limb.points, x.limb.depth)) for x in others if x.limb)]
-    }
+    bones = core_bones(canvas, divided, joints)
+    flat = _may_end_flat(canvas, divided, joints)
+    make = _Inflation(canvas, loads, flat, device, fields)
+    surfaces = [make(core, bones)]
     layers: list[Layer] = [core]
     limbs: list[Limb | None] = [None]
-    surfaces = [inflated(canvas, core, mid_surface(canvas, points, depth), loads, device, profiles)]
     top, bottom = _extent(surfaces[0])
     legs_top, legs_bottom = np.full_like(top, np.nan), np.full_like(bottom, np.nan)
     for layer in sorted(others, key=_drawn_order):
         assert layer.limb is not None
         if layer.limb.is_arm:
             limb = place_limb(layer.limb, canvas, np.fmax(top, legs_top), np.fmin(bottom, legs_bottom), behind=True)
+        elif layer.limb.cloth:
+            limb = place_limb(out_of_cloth(layer.limb, canvas, divided, joints), canvas, legs_top, legs_bottom)
         else:
             raised = layer.limb.seen & (joints[JOINT["pelvis"], 1] < layer.limb.points[:, 1])
             limb = place_limb(layer.limb, canvas, legs_top, legs_bottom)
             if raised.any():
                 limb = place_limb(limb, canvas, top, bottom)
-        surface = inflated(canvas, layer, mid_surface(canvas, limb.points, limb.depth), loads, device, profiles)
+        surface = make(layer, Bones.of(limb))
+        if limb.cloth:
+            surface = _within(surface, canvas.pitch, top, bottom)
         layers.append(layer)
         limbs.append(limb)
         surfaces.append(surface)
         above, below = _extent(surface)
         if not limb.is_arm:
             legs_top, legs_bottom = np.fmax(legs_top, above), np.fmin(legs_bottom, below)
-    return _joined(canvas, layers, limbs, surfaces, loads, device, profiles)
+    return _joined(canvas, layers, limbs, surfaces, make)
 
 
-def _trunk(divided: Split, joints: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(N, 2) points and (N,) depths of the bones in the core: the trunk, the head and the limbs that lie free of it."""
-    in_core = [limb for limb in divided.limbs if all(limb is not layer.limb for layer in divided.layers)]
-    trunk_joints = [
-        JOINT[n] for n in ("neck", "thorax", "pelvis", "l_shoulder", "r_shoulder", "l_hip", "r_hip", "head")
+class _Inflation:
+    """Layers and their bones to surfaces; what networks say of a layer is measured once."""
+
+    def __init__(
+        self,
+        canvas: Canvas,
+        loads: NDArray[np.float64],
+        flat: NDArray[np.uint8],
+        device: str,
+        fields: tuple[PartSdf, ...],
+    ) -> None:
+        self.canvas, self.loads, self.flat, self.device, self.fields = canvas, loads, flat, device, fields
+        self.profiles: dict[str, Profile | None] = {}
+
+    def __call__(self, layer: Layer, bones: Bones) -> LayerSurface:
+        canvas = self.canvas
+        if layer.name not in self.profiles:
+            # The networks' parts lie where the joints are, also where the limb has been moved since.
+            self.profiles[layer.name] = self._profile(layer, bones if layer.limb is None else Bones.of(layer.limb))
+        profile = self.profiles[layer.name]
+        ends = flat_ends(canvas, layer.region, np.isin(layer.labels, self.flat))
+        rim = rim_distance(canvas, layer.region, ends)
+        u = self._raised(layer.region, layer.labels, bones, ends, rim)
+        u = extended(rim[: len(u)], u, canvas.pitch)
+        z0 = mid_surface(canvas, bones.points, bones.depth)
+        if profile is not None:
+            u, z0 = u * profile.ratio, z0 + profile.offset
+        return LayerSurface(u, z0, layer.labels, None if ends is None else clip_distance(canvas, layer.region, ends))
+
+    def _raised(
+        self,
+        region: NDArray[np.bool_],
+        labels: NDArray[np.uint8],
+        bones: Bones,
+        ends: Ends | None,
+        rim: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """(H, W) squared half thickness of an inflated outline, FIGURE units²; 0 outside its `rim_distance`."""
+        height = len(region)
+        if ends is not None:
+            below = labels[np.maximum(ends.source, 0), np.arange(region.shape[1])]
+            rows = ((0, ends.extra), (0, 0))
+            labels = np.where(ends.beyond, below, np.pad(labels, rows))
+            region = np.pad(region, rows) | ends.beyond
+        load = _load(region, labels, self.loads, self.canvas.pitch)
+        steep = mid_surface(self.canvas, bones.points, bones.slope2)
+        u = inflate(rim < 0, load, self.device, rim)[:height] * self.canvas.pitch**2
+        if (labels == PART["head"]).any():
+            u = self._without_grooves(region[:height], labels[:height], u, rim[:height])
+        return np.asarray(u * (1.0 + np.maximum(steep, 0.0)))
+
+    def _without_grooves(
+        self, region: NDArray[np.bool_], labels: NDArray[np.uint8], u: NDArray[np.float64], rim: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """A head whose nooks (below a nose, between locks of hair) stay at its rim instead of running across it.
+
+        The head is inflated with its nooks filled, and brought to zero at the drawn rim by the ratio of the distances
+        to the two rims: 1 where they agree, and nearly 1 from twice a nook's depth inwards.
+        """
+        pitch = self.canvas.pitch
+        head = labels == PART["head"]
+        filled = closing(head, NOOK / pitch) | region
+        _, nearest = ndimage.distance_transform_edt(~region, return_indices=True)
+        load = _load(filled, labels[tuple(nearest)], self.loads, pitch)
+        outer = np.minimum(rim, ndimage.gaussian_filter(raster_distance(filled), RIM_BLUR / pitch) * pitch)
+        smooth = inflate(outer < 0, load, self.device, outer) * pitch**2
+        share = 1.0 - (1.0 - np.clip(rim / np.minimum(outer, -1e-9), 0.0, 1.0)) ** 3
+        weight = ndimage.gaussian_filter(head.astype(float), NOOK / pitch)
+        return np.asarray(np.where(rim < 0, u + weight * (np.maximum(u, smooth * share) - u), 0.0))
+
+    def _profile(self, layer: Layer, bones: Bones) -> Profile | None:
+        """What the networks say of a layer; None where they know none of its parts."""
+        canvas = self.canvas
+        own = [field for field in self.fields if (layer.labels == field.part).any()]
+        if not own:
+            return None
+        reference = self._raised(layer.region, layer.labels, bones, None, rim_distance(canvas, layer.region, None))
+        bone = mid_surface(canvas, bones.points, bones.depth)
+        return measure_profile(canvas, layer.labels, own, reference, bone)
+
+
+def _may_end_flat(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Labels of what may end flat: garments that legs come out of or that hide them, feet that stand on the ground."""
+    ground = canvas.points()[canvas.inside][:, 1].min()
+    standing = [
+        PART[f"{side}_foot"]
+        for side in "lr"
+        if joints[JOINT[f"{side}_foot"], 1] < ground + STANDING and joints[JOINT[f"{side}_ankle"], 1] > ground
     ]
-    trunk = np.concatenate([joints[trunk_joints], _between(joints[JOINT["thorax"]], joints[JOINT["pelvis"]])])
-    points = np.concatenate([trunk[:, :2], *(limb.points for limb in in_core)])
-    return points, np.concatenate([trunk[:, 2], *(limb.depth for limb in in_core)])
-
-
-def _layer_profile(
-    canvas: Canvas,
-    layer: Layer,
-    points: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    loads: NDArray[np.float64],
-    device: str,
-    fields: tuple[PartSdf, ...],
-) -> Profile | None:
-    """What the networks say of a layer; None where they know none of its parts."""
-    own = [field for field in fields if (layer.labels == field.part).any()]
-    if not own:
-        return None
-    front, back = column_extents(canvas, own)
-    # Where the layer goes on without a network (cloth, hair), so does what is inflated for comparison: inflation sinks
-    # towards an end, and a network's part that is cut off there does not.
-    unknown = layer.region & ~np.isin(layer.labels, [field.part for field in own])
-    covered = np.isfinite(front) | unknown
-    _, nearest = ndimage.distance_transform_edt(~layer.region, return_indices=True)
-    whole = replace(layer, region=covered, labels=layer.labels[tuple(nearest)])
-    reference = inflate(covered, _load(canvas, whole, loads), device) * canvas.pitch**2
-    bone = mid_surface(canvas, points, depth)
-    return measure_profile(canvas, layer.region, front, back, reference, bone)
+    legs = [limb for limb in divided.limbs if not limb.is_arm]
+    hems = [PART["garment"]] if not legs or any(limb.cloth for limb in legs) else []
+    return np.array([*hems, *standing], np.uint8)
 
 
 def _joined(
@@ -134,9 +205,7 @@ def _joined(
     layers: list[Layer],
     limbs: list[Limb | None],
     surfaces: list[LayerSurface],
-    loads: NDArray[np.float64],
-    device: str,
-    profiles: dict[str, Profile | None],
+    make: _Inflation,
 ) -> tuple[LayerSurface, ...]:
     """The surfaces with floating limbs brought back towards the middle of the body until they hold."""
     for attempt in range(ATTEMPTS):
@@ -151,8 +220,7 @@ def _joined(
             if attempt:
                 # Being at the same depth is not enough for layers that only meet at their rims.
                 layers[index] = _grown(canvas, layers[index])
-            z0 = mid_surface(canvas, limb.points, limb.depth)
-            surfaces[index] = inflated(canvas, layers[index], z0, loads, device, profiles)
+            surfaces[index] = make(layers[index], Bones.of(limb))
     return tuple(surfaces)
 
 
@@ -170,13 +238,23 @@ def _drawn_order(layer: Layer) -> tuple[bool, float, float]:
     return limb.is_arm, float(limb.seen.mean()), -float(limb.points[-1, 1])
 
 
-def _between(start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.float64]:
-    t = np.linspace(0.0, 1.0, 6)[:, None]
-    return start + t * (end - start)
+def _within(surface: LayerSurface, pitch: float, top: NDArray[np.float64], bottom: NDArray[np.float64]) -> LayerSurface:
+    """A leg kept inside of the cloth that it comes out of, a little below its surface."""
+    front, back = _extent(surface)
+    lower, upper = np.fmin(front, top - pitch), np.fmax(back, bottom + pitch)
+    there = np.isfinite(top) & np.isfinite(front)
+    half = np.where(there, np.maximum(lower - upper, 0.5 * pitch) / 2, 0.0)
+    return replace(
+        surface,
+        u=np.where(there, half**2, surface.u),
+        z0=np.where(there, (np.clip(lower, bottom, top) + np.clip(upper, bottom, top)) / 2, surface.z0),
+    )
 
 
 def _extent(surface: LayerSurface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    half = np.where(surface.u > 0, np.sqrt(np.maximum(surface.u, 0.0)), np.nan)
+    # Beyond a flat end the layer only seems to go on.
+    there = (surface.u > 0) & (True if surface.clip is None else surface.clip < 0)
+    half = np.where(there, np.sqrt(np.maximum(surface.u, 0.0)), np.nan)
     return surface.z0 + half, surface.z0 - half
 
 
@@ -190,48 +268,11 @@ def part_loads(joints: NDArray[np.float64]) -> NDArray[np.float64]:
     return loads
 
 
-def inflated(
-    canvas: Canvas,
-    layer: Layer,
-    z0: NDArray[np.float64],
-    loads: NDArray[np.float64],
-    device: str,
-    profiles: dict[str, Profile | None],
-) -> LayerSurface:
-    u = inflate(layer.region, _load(canvas, layer, loads), device) * canvas.pitch**2
-    u = _extended(canvas, layer.region, u)
-    profile = profiles.get(layer.name)
-    if profile is not None:
-        u, z0 = u * profile.ratio, z0 + profile.offset
-    return LayerSurface(u, z0, layer.labels)
-
-
-def _load(canvas: Canvas, layer: Layer, loads: NDArray[np.float64]) -> NDArray[np.float64]:
+def _load(
+    region: NDArray[np.bool_], labels: NDArray[np.uint8], loads: NDArray[np.float64], pitch: float
+) -> NDArray[np.float64]:
     """(H, W) right-hand side of the inflation, without jumps between parts."""
-    values = np.where(layer.region, loads[layer.labels], 0.0)
-    blur = 0.03 / canvas.pitch
-    cover = ndimage.gaussian_filter(layer.region.astype(float), blur)
+    values = np.where(region, loads[labels], 0.0)
+    blur = 0.03 / pitch
+    cover = ndimage.gaussian_filter(region.astype(float), blur)
     return np.asarray(ndimage.gaussian_filter(values, blur) / np.maximum(cover, 1e-6))
-
-
-def _extended(canvas: Canvas, region: NDArray[np.bool_], u: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Continue u below zero outside its region, with the drawn contour located to a fraction of a pixel.
-
-    Near the rim u grows linearly with the distance to it. The solver knows that distance only in whole pixels, the
-    canvas knows it exactly: u is rescaled by their ratio. Outside, a circle's u goes on as −(s d + d²), where s is the
-    slope at the rim: then the distance formula of `_evaluate` is exact for circular cross-sections.
-    """
-    whole = ndimage.distance_transform_edt(region, sampling=canvas.pitch)
-    beyond, rim = ndimage.distance_transform_edt(~region, sampling=canvas.pitch, return_indices=True)
-    slope = np.where(region, u / np.maximum(whole, canvas.pitch), 0.0)
-    # The outermost pixels carry the solver's stairs; the slope two pixels further in is smooth.
-    inner = whole >= 2.0 * canvas.pitch
-    if inner.any():
-        _, source = ndimage.distance_transform_edt(~inner, return_indices=True)
-        slope = np.where(inner, slope, slope[tuple(source)])
-    slope = slope[tuple(rim)]
-    slope = np.where(region, slope, ndimage.gaussian_filter(slope, 1.5))
-    # Where the region ends inside the silhouette (under another layer) its own raster distance must do.
-    own = np.where(region, 0.5 * canvas.pitch - whole, beyond - 0.5 * canvas.pitch)
-    distance = np.where(np.abs(own - canvas.sdf) < 1.5 * canvas.pitch, canvas.sdf, own)
-    return np.asarray(np.where(distance > 0, -(slope * distance + distance**2), -slope * distance))

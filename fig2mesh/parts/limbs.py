@@ -45,6 +45,7 @@ class Limb:
     free : (N, 2) bool, the same where that end is near enough to be the limb's own contour
     width : (N, 2) float64, free length to the left and right, capped
     seen : (N,) bool, False between joints of which one is hidden
+    cloth : whether it comes out of a garment that covers its upper part
     """
 
     name: str
@@ -57,6 +58,7 @@ class Limb:
     free: NDArray[np.bool_]
     width: NDArray[np.float64]
     seen: NDArray[np.bool_]
+    cloth: bool = False
 
     @property
     def is_arm(self) -> bool:
@@ -85,6 +87,10 @@ class Limb:
 
 ENOUGH = 0.3
 """Share of a limb's circles that must have been measured for the others to follow them."""
+
+
+ALIKE = 0.8
+"""Where one side of a limb is hidden it is at least this thick compared with its twin."""
 
 
 def make_limb(name: str, joints: NDArray[np.float64], visible: BoolArray) -> Limb:
@@ -161,6 +167,9 @@ def complete(limb: Limb, twin: Limb, stout: float, pitch: float) -> Limb:
     from_twin = np.isfinite(twin.radius) & (twin.radius > 0)
     if known.mean() < ENOUGH and from_twin.mean() >= ENOUGH:
         stout = float(np.median((twin.radius / twin.usual)[from_twin]))
+    ratio = np.where(
+        known & ~limb.free.all(axis=1) & from_twin, np.fmax(ratio, ALIKE * twin.radius / twin.usual), ratio
+    )
     if known.mean() < ENOUGH:
         ratio = np.where(known, np.maximum(ratio, 0.8 * stout), stout)
     else:

@@ -19,6 +19,7 @@ from scipy import ndimage
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.fillets import make_fillets
 from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.layers import LayerSurface, raise_layers
 from fig2mesh.parts.network import hidden_parts
@@ -37,12 +38,16 @@ LEAST_NODES, MOST_NODES = 64, 192
 
 @dataclass(frozen=True)
 class Outline:
-    """Everything the outline road knows: the part fields and, for the texture, which part each pixel shows."""
+    """Everything the outline road knows: the part fields and, for the texture, which part each pixel shows.
+
+    fillets : (first, second, grid) between two of the parts, see `Body`
+    """
 
     parts: tuple[PartSdf, ...]
     split: Split
     layers: tuple[LayerSurface, ...]
     canvas: Canvas
+    fillets: tuple[tuple[int, int, PartSdf], ...] = ()
 
 
 def outline_parts(
@@ -67,15 +72,17 @@ def outline_parts(
     divided = split(canvas, joints, visible)
     fields = infer(canvas, divided) if infer is not None else ()
     surfaces = raise_layers(canvas, divided, joints, device, fields)
-    parts = [
-        part
-        for surface in surfaces
+    found = [
+        (number, part)
+        for number, surface in enumerate(surfaces)
         for label in np.unique(surface.labels[surface.labels > 0])
         if (part := _part_field(canvas, surface, int(label), voxel, divided, device)) is not None
     ]
-    if not parts:
+    if not found:
         raise FigureError("silhouette", "too thin to be a solid", "pass a larger picture, or --quality fine")
-    return Outline((*parts, *hidden_parts(fields, tuple(parts), canvas, divided)), divided, surfaces, canvas)
+    layer_of, parts = zip(*found, strict=True)
+    hidden = hidden_parts(fields, parts, canvas, divided)
+    return Outline((*parts, *hidden), divided, surfaces, canvas, make_fillets(canvas, parts, layer_of))
 
 
 def _part_field(
@@ -87,6 +94,8 @@ def _part_field(
         return None
     cut = (ndimage.distance_transform_edt(~here) - ndimage.distance_transform_edt(here)) * canvas.pitch
     cut = ndimage.gaussian_filter(cut, 2.0) - OVERLAP
+    if surface.clip is not None:
+        cut = np.maximum(cut, surface.clip)
     solid = (surface.u > 0) & (cut < 0)
     if not solid.any():
         return None

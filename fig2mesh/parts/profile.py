@@ -16,21 +16,26 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.records import PartSdf
+from fig2mesh.records import PART, PartSdf
 
-SMOOTHNESS = 0.022
-"""Spread of the average over neighbouring columns, FIGURE units: finer detail of a network is noise."""
+DETAIL = 0.04
+"""Spread of the average over neighbouring columns of a part, FIGURE units: finer detail of a network is noise."""
+
+SMOOTHNESS = 0.025
+"""Spread of the blend from one part to the next, FIGURE units."""
 
 RATIO = (0.25, 2.5)
 """Bounds of the squared thickness relative to the inflation: half as thick to one and a half times."""
 
+HEAD_RATIO = (0.7, 1.3)
+"""The same of heads: those of drawings are round, whatever is on them."""
+
 OFFSET = 0.12
 """Largest distance of the middle from the bone, FIGURE units."""
 
-FADING = 0.08
-"""Distance over which the inflation takes over where no network reaches, FIGURE units."""
-
-LEAST_COVER = 0.02
+DOUBT, BELIEF = 0.45, 0.7
+"""Overlap of a network's part with the drawn one, seen from the front: up to the former nothing of what it says of
+depth counts, from the latter on all of it."""
 
 
 @dataclass(frozen=True)
@@ -93,36 +98,51 @@ def _window(where: NDArray[np.float64], nodes: int) -> tuple[slice, slice] | Non
 
 def measure_profile(
     canvas: Canvas,
-    region: NDArray[np.bool_],
-    front: NDArray[np.float64],
-    back: NDArray[np.float64],
+    labels: NDArray[np.uint8],
+    fields: Sequence[PartSdf],
     reference: NDArray[np.float64],
     bone: NDArray[np.float64],
 ) -> Profile | None:
-    """The profile of a layer; None where networks and drawing do not overlap.
+    """The profile of a layer; None where the networks know none of its parts.
 
-    region : (H, W) bool, the drawn layer
-    front, back : (H, W) as `column_extents` gives them
-    reference : (H, W) squared half thickness of the inflation of what `front` and `back` cover
+    labels : (H, W) uint8, the parts of the drawn layer, 0 outside
+    fields : of its parts
+    reference : (H, W) squared half thickness of the inflated layer
     bone : (H, W) depth of the bones
     """
-    common = np.isfinite(front) & region & (reference > 0)
-    if not common.any():
+    ratio, offset = np.ones(labels.shape), np.zeros(labels.shape)
+    known = False
+    for field in fields:
+        drawn = labels == field.part
+        front, back = column_extents(canvas, [field])
+        there = np.isfinite(front)
+        common = there & drawn & (reference > 0)
+        if not common.any():
+            continue
+        # How well a network explains the drawing says how far it can be believed: a pictogram's head is no head.
+        overlap = common.sum() / max(int((there | drawn).sum()), 1)
+        trust = float(np.clip((overlap - DOUBT) / (BELIEF - DOUBT), 0.0, 1.0))
+        half = np.where(common, np.nan_to_num(front - back) / 2, 0.0)
+        middle = np.where(common, np.nan_to_num(front + back) / 2 - bone, 0.0)
+        # Sums before quotients: near a rim both are small, and neither alone means much. A head is a ball, and what
+        # its outline has of noses, hats and locks is not to be repeated in depth: its sums run over all of it.
+        blur = (np.inf if field.part == PART["head"] else DETAIL) / canvas.pitch
+        squares, usual, weights, moments = (
+            _averaged(np.where(common, values, 0.0), blur) for values in (half**2, reference, half, half * middle)
+        )
+        bounds = HEAD_RATIO if field.part == PART["head"] else RATIO
+        ratio[drawn] = np.clip(squares / np.maximum(usual, 1e-12), *bounds)[drawn] ** trust
+        offset[drawn] = trust * np.clip(moments / np.maximum(weights, 1e-12), -OFFSET, OFFSET)[drawn]
+        known = True
+    if not known:
         return None
-    half = np.where(common, np.nan_to_num(front - back) / 2, 0.0)
-    middle = np.where(common, np.nan_to_num(front + back) / 2 - bone, 0.0)
+    region = labels > 0
     blur = SMOOTHNESS / canvas.pitch
+    _, nearest = ndimage.distance_transform_edt(~region, return_indices=True)
+    return Profile(*(ndimage.gaussian_filter(values[tuple(nearest)], blur) for values in (ratio, offset)))
 
-    def average(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(ndimage.gaussian_filter(np.where(common, values, 0.0), blur))
 
-    # Sums before quotients: near a rim both are small, and neither alone means much.
-    ratio = average(half**2) / np.maximum(average(reference), 1e-12)
-    offset = average(half * middle) / np.maximum(average(half), 1e-12)
-    known = average(np.ones_like(half)) > LEAST_COVER
-    away, nearest = ndimage.distance_transform_edt(~known, sampling=canvas.pitch, return_indices=True)
-    # Beyond what a network knows (a skirt, a hat's brim) what is known nearest fades into the plain inflation.
-    fading = np.exp(-((away / FADING) ** 2))
-    ratio = np.clip(ratio, *RATIO)[tuple(nearest)] ** fading
-    offset = np.clip(offset, -OFFSET, OFFSET)[tuple(nearest)] * fading
-    return Profile(ndimage.gaussian_filter(ratio, blur), ndimage.gaussian_filter(offset, blur))
+def _averaged(values: NDArray[np.float64], blur: float) -> NDArray[np.float64]:
+    # With a trace of the overall mean where nothing is near.
+    near = ndimage.gaussian_filter(values, blur, truncate=3.0) if np.isfinite(blur) else 0.0
+    return np.asarray(near + 1e-3 * values.mean() * np.ones(values.shape))

@@ -7,20 +7,31 @@ so that inflating it does not leave a trench where the arm is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import LIMBS, STOUT, Limb, complete, make_limb, measure, stoutness
+from fig2mesh.parts.owners import owners
 from fig2mesh.records import JOINT, PART, BoolArray
 
 LAYERED_SHARE = 0.22
 """Limbs with a larger share of their length against something else become layers of their own."""
 
 HEAD_RADIUS_MIN = 0.05
+
+CLOTHED = 4
+"""Circles of a leg that cloth covers before the rest of the leg becomes a layer of its own that comes out of it."""
+
+NARROWER = 0.65
+"""Such a leg is narrower than this share of the cloth above it."""
+
+REACH_UNDER = 3
+"""Circles that such a leg goes on under the cloth."""
 
 
 @dataclass(frozen=True)
@@ -71,25 +82,40 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
     covered = {}
     for limb, other in zip(limbs, _twins(limbs), strict=True):
         covered[limb.name] = np.zeros(len(limb.points), bool) if limb.is_arm else _under_cloth(limb, other, visible)
-    bare = [_keep(limb, ~covered[limb.name]) for limb in limbs]
-    layered = [limb for limb in bare if limb is not None and _contact(limb) > LAYERED_SHARE]
+    covered = _same_hem(limbs, covered)
+    strictly = [_keep(limb, ~covered[limb.name]) for limb in limbs]
+    bare = [_keep(limb, ~_shortened(covered[limb.name])) for limb in limbs]
+    bare = [
+        _clothed(b, covered[limb.name]) if b is not None and _steps_out(limb, covered[limb.name]) else b
+        for b, limb in zip(bare, limbs, strict=True)
+    ]
+    layered = [limb for limb in bare if limb is not None and (limb.cloth or _contact(limb) > LAYERED_SHARE)]
     merged = [limb for limb in bare if limb is not None and not any(limb is x for x in layered)]
 
     # Who owns each pixel of the silhouette: the core or one of the layered limbs.
-    core_excess = np.minimum(torso, head - _head_radius(canvas, joints))
+    core_excess = np.minimum(torso, head - head_radius(canvas, joints))
     core_excess = np.minimum(core_excess, _thorax_distance(points, joints))
     for limb in merged:
         core_excess = np.minimum(core_excess, limb.excess(points)[0])
-    uncovered = np.minimum.reduce([torso, *(limb.excess(points)[0] for limb in bare if limb is not None)])
+    uncovered = np.minimum.reduce([torso, *(limb.excess(points)[0] for limb in strictly if limb is not None)])
+    below_hem = {}
     for limb in limbs:
+        below_hem[limb.name] = inside & ~covered[limb.name][_nearest_circle(limb, points)]
         hidden = _keep(limb, covered[limb.name])
         if hidden is not None and covered[limb.name].any():
             cloth = hidden.excess(points)[0]
             core_excess = np.minimum(core_excess, cloth)
             garment |= inside & (cloth < uncovered)
-    owner = _owners(canvas, core_excess, layered, points)
+    owner = owners(canvas, core_excess, layered, points)
+    for index, limb in enumerate(layered, start=1):
+        if limb.cloth:
+            # Above the hem the drawing shows cloth, below it the leg: the hem runs across the leg.
+            stump = below_hem[limb.name] & (limb.excess(points)[0] < 0.3 * limb.radius[-1])
+            garment &= ~stump
+            owner[garment & (owner == index)] = 0
+            owner[stump & (owner == 0)] = index
 
-    layers = []
+    layers: list[Layer] = []
     completed = owner == 0
     for index, limb in enumerate(layered, start=1):
         excess, nearest = limb.excess(points)
@@ -97,9 +123,11 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         region = _with_chain(region, excess)
         computed = np.where(region, limb.part_of(nearest), np.uint8(0))
         layers.append(Layer(limb.name, region, _as_given(computed, canvas, owner == index, limb.part), limb))
+        if limb.cloth:
+            continue
         # Behind a limb the core goes on: inside the torso, around the root joint, and where it is on both sides.
         root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
-        behind = _closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
+        behind = closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
         completed |= inside & region & ((torso < 0) | root | behind)
     # Detached pieces that only a limb claimed but does not reach belong to the core, whatever is left of them.
     completed |= inside & ~np.logical_or.reduce([completed, *(layer.region for layer in layers)])
@@ -137,6 +165,31 @@ def _twins(limbs: list[Limb]) -> list[Limb]:
     return [by_name[("r" if limb.name[0] == "l" else "l") + limb.name[1:]] for limb in limbs]
 
 
+def _shortened(covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What is covered without its end: a leg goes on a little way under its cloth."""
+    result = covered.copy()
+    result[: len(covered) - REACH_UNDER] &= covered[REACH_UNDER:]
+    result[len(covered) - REACH_UNDER :] &= covered.all()
+    return result
+
+
+def _steps_out(limb: Limb, covered: NDArray[np.bool_]) -> bool:
+    """Whether a leg comes out of its cloth much narrower than the cloth is, as out of a skirt."""
+    if covered.sum() < CLOTHED or covered.all():
+        return False
+    below = limb.radius[~covered][: 2 * REACH_UNDER]
+    above = limb.width[covered][-2 * REACH_UNDER :].sum(axis=1) / 2
+    return float(np.median(below)) < NARROWER * float(np.median(above))
+
+
+def _clothed(bare: Limb, covered: NDArray[np.bool_]) -> Limb:
+    """A leg that comes out of cloth; under it, where only the cloth can be measured, as thick as just below."""
+    under = len(bare.points) - int((~covered).sum())
+    radius = bare.radius.copy()
+    radius[:under] = np.median(radius[under : under + REACH_UNDER])
+    return replace(bare, radius=radius, cloth=True)
+
+
 def _keep(limb: Limb, chosen: NDArray[np.bool_]) -> Limb | None:
     """The limb reduced to some of its circles; None where fewer than two are left."""
     if chosen.all():
@@ -147,7 +200,7 @@ def _keep(limb: Limb, chosen: NDArray[np.bool_]) -> Limb | None:
         name: getattr(limb, name)[chosen]
         for name in ("points", "depth", "radius", "usual", "part", "ends", "free", "width", "seen")
     }
-    return Limb(limb.name, **arrays)
+    return Limb(limb.name, **arrays, cloth=limb.cloth)
 
 
 def _contact(limb: Limb) -> float:
@@ -200,6 +253,21 @@ def _under_cloth(limb: Limb, twin: Limb, visible: BoolArray) -> NDArray[np.bool_
     return rows < (len(rows) if hem > ankle else hem)
 
 
+def _same_hem(limbs: list[Limb], covered: dict[str, NDArray[np.bool_]]) -> dict[str, NDArray[np.bool_]]:
+    """Cloth that covers one leg covers the other down to the same height, where that one has no contour of its own."""
+    result = dict(covered)
+    for limb, twin in zip(limbs, _twins(limbs), strict=True):
+        if limb.is_arm or covered[limb.name].any() or not _steps_out(twin, covered[twin.name]):
+            continue
+        hem = twin.points[covered[twin.name], 1].min()
+        if hem < limb.points[len(limb.points) * 2 // 5, 1]:
+            # Long coats open in front: a leg steps out of them.
+            continue
+        inside_cloth = (limb.points[:, 1] > hem) & ~limb.free.all(axis=1)
+        result[limb.name] = np.logical_and.accumulate(inside_cloth)
+    return result
+
+
 def _as_given(
     computed: NDArray[np.uint8], canvas: Canvas, shown: NDArray[np.bool_], parts: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
@@ -207,68 +275,6 @@ def _as_given(
     given = canvas.labels
     wanted = shown & (computed > 0) & (np.isin(given, parts) | (given >= PART["hair"]))
     return np.where(wanted, given, computed).astype(np.uint8)
-
-
-def _owners(
-    canvas: Canvas, core_excess: NDArray[np.float64], layered: list[Limb], points: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """(H, W) 0 core, 1.. layered limbs, -1 outside: the layer that the drawing shows at each pixel."""
-    inside = canvas.inside
-    owner = np.full(inside.shape, -2)
-    costs = [core_excess]
-    for index, limb in enumerate(layered, start=1):
-        excess, nearest = limb.excess(points)
-        mine = inside & (excess < 0.25 * limb.radius[nearest])
-        # A hidden limb lies behind: the drawing shows the core there.
-        shown = limb.seen[nearest] | (core_excess > 0)
-        better = np.ones(inside.shape, bool)
-        for rival in range(1, index):
-            better &= (owner != rival) | (excess < costs[rival])
-        owner[mine & shown & better] = index
-        costs.append(excess)
-    owner[inside & (owner == -2) & (core_excess < 0)] = 0
-    owner[~inside] = -1
-    given = canvas.labels
-    for label in np.unique(given[inside]):
-        index = next((i for i, limb in enumerate(layered, start=1) if label in limb.part), 0)
-        # Hair, cloth and held things stay with the layer that the skeleton finds for them.
-        if 0 < label < PART["hair"]:
-            owner[inside & (given == label)] = index
-    _give_leftovers(owner, np.stack(costs))
-    _rejoin_islands(owner, layered, np.stack(costs))
-    return owner
-
-
-def _give_leftovers(owner: NDArray[np.int64], costs: NDArray[np.float64]) -> None:
-    """Pixels nobody claimed (cloth, hair, bags) go, piece by piece, to the layer with which they share most border."""
-    pieces, _ = ndimage.label(owner == -2)
-    for index, window in enumerate(ndimage.find_objects(pieces), start=1):
-        grown = tuple(slice(max(0, s.start - 1), s.stop + 1) for s in window)
-        piece = pieces[grown] == index
-        border = ndimage.binary_dilation(piece) & ~piece & (owner[grown] >= 0)
-        neighbours = np.bincount(owner[grown][border], minlength=len(costs)) if border.any() else np.zeros(len(costs))
-        if neighbours.sum():
-            choice = int(np.argmax(neighbours))
-            # A large piece that also touches the core is cloth or hair of the body, not of the limb in front of it.
-            if piece.sum() > 0.5 * (owner == choice).sum() and neighbours[0] > 0.05 * neighbours.sum():
-                choice = 0
-        else:
-            choice = int(np.argmin(costs[(slice(None), *grown)][:, piece].mean(axis=1)))
-        owner[grown][piece] = choice
-
-
-def _rejoin_islands(owner: NDArray[np.int64], layered: list[Limb], costs: NDArray[np.float64]) -> None:
-    """Pixels cut off from their own layer would float at its depth: they go to the layer around them."""
-    for index in range(len(costs)):
-        pieces, count = ndimage.label(owner == index, np.ones((3, 3)))
-        if count < 2:
-            continue
-        sizes = np.bincount(pieces.ravel())[1:]
-        for piece in np.argsort(sizes)[:-1] + 1:
-            here = pieces == piece
-            border = ndimage.binary_dilation(here, np.ones((3, 3))) & ~here & (owner >= 0) & (owner != index)
-            if border.any():
-                owner[here] = np.bincount(owner[border]).argmax()
 
 
 def _with_chain(region: NDArray[np.bool_], excess: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -298,7 +304,7 @@ def _core_labels(
     return np.where(garment, PART["garment"], labels).astype(np.uint8)
 
 
-def _head_radius(canvas: Canvas, joints: NDArray[np.float64]) -> float:
+def head_radius(canvas: Canvas, joints: NDArray[np.float64]) -> float:
     """Half width of the head: distance from its centre to the contour."""
     depth = -float(canvas.sample(canvas.sdf, joints[None, JOINT["head"], :2])[0])
     return max(depth, HEAD_RADIUS_MIN)
@@ -313,10 +319,13 @@ def _thorax_distance(points: NDArray[np.float64], joints: NDArray[np.float64]) -
 
 
 def _chain_distance(limb: Limb, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    from scipy.spatial import cKDTree
-
     distance, _ = cKDTree(limb.points).query(points.reshape(-1, 2))
     return np.asarray(distance).reshape(points.shape[:-1])
+
+
+def _nearest_circle(limb: Limb, points: NDArray[np.float64]) -> NDArray[np.intp]:
+    _, index = cKDTree(limb.points).query(points.reshape(-1, 2))
+    return np.asarray(index).reshape(points.shape[:-1])
 
 
 def _segment_distance(
@@ -341,7 +350,7 @@ def _polygon_distance(points: NDArray[np.float64], corners: NDArray[np.float64])
     return np.where(within, -distance, distance)
 
 
-def _closing(image: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
+def closing(image: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
     """Morphological closing by a disc, by distances: its cost does not grow with the radius (pixels)."""
     pad = int(radius) + 2
     grown = ndimage.distance_transform_edt(~np.pad(image, pad)) <= radius

@@ -207,16 +207,18 @@ def _size_table(data: Path) -> str:
 
 
 def _figure_table(pack: Pack, figures: int) -> str:
-    from fig2mesh.training.assembled import ROADS, measure_roads
+    from fig2mesh.training.assembled import GIVEN, ROADS, measure_roads
 
     rows, parts = [], []
     for split in SPLITS:
         found = [measure_roads(pack, split, seed) for seed in range(figures)]
-        for road in ROADS:
+        for road in (*ROADS, *(GIVEN + road for road in ROADS)):
             results = [one[road] for one in found]
             rows.append((
-                f"{SPLIT_TITLE[split]}: {road}", _spread([1000 * r.chamfer for r in results], ".1f"),
-                f"{1000 * float(np.median([r.chamfer for r in results])):.1f}",
+                f"{SPLIT_TITLE[split]}: {road}", _spread([1000 * r.likeness.chamfer for r in results], ".1f"),
+                f"{1000 * float(np.median([r.likeness.chamfer for r in results])):.1f}",
+                f"{float(np.mean([r.likeness.normals for r in results])):.3f}",
+                f"{100 * float(np.mean([r.likeness.side_iou for r in results])):.1f}",
                 f"{100 * float(np.mean([np.mean(list(r.ious.values())) for r in results])):.1f}",
             ))  # fmt: skip
             by_kind: dict[str, list[float]] = {kind: [] for kind in KINDS}
@@ -228,8 +230,10 @@ def _figure_table(pack: Pack, figures: int) -> str:
     text = (
         "Drawings of dressed bodies (front view; silhouette and 2D joints are given, depths are not) against the "
         "bodies themselves, scaled to a drawn height of 1.79 m. A drawing does not say how far away a figure stands: "
-        "it is shifted in depth to where it fits best. Chamfer: mean distance of the surfaces, both ways averaged."
+        "it is shifted in depth to where it fits best. Chamfer: mean distance of the surfaces, both ways averaged; "
+        "normals: mean cosine at nearest points, both ways; side IoU: of the silhouettes seen from the figure's left. "
+        "With true depths: the joints' depths are given as well, so that only shape is measured."
     )
-    first = table(("road", "chamfer mm", "median mm", "part IoU %"), rows)
+    first = table(("road", "chamfer mm", "median mm", "normals", "side IoU %", "part IoU %"), rows)
     second = table(("part IoU %", *(kind.replace("_", " ") for kind in KINDS)), parts)
     return f"{text}\n\n{first}\n\n{second}"

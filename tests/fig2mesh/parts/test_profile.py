@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -39,6 +41,11 @@ def reference(disc: Canvas) -> NDArray[np.float64]:
     return inflate(disc.inside, np.full(disc.sdf.shape, 4.0)) * PITCH**2
 
 
+def torso(disc: Canvas) -> NDArray[np.uint8]:
+    """The whole disc labelled as torso."""
+    return np.where(disc.inside, np.uint8(1), np.uint8(0))
+
+
 def middle_of(disc: Canvas) -> tuple[int, int]:
     return disc.sdf.shape[0] // 2, disc.sdf.shape[1] // 2
 
@@ -59,15 +66,12 @@ def test_columns_of_an_ellipsoid_are_as_long_as_its_formula_says() -> None:
 
 
 @pytest.mark.parametrize("thickness", [0.7, 1.0, 1.5])
-@pytest.mark.parametrize("size", [0.8, 1.0, 1.2])
-def test_ratio_is_the_square_of_relative_thickness_and_offset_the_shift(thickness: float, size: float) -> None:
-    """The network's part may be smaller or larger than drawn: its own rim must not change what is drawn."""
+def test_ratio_is_the_square_of_relative_thickness_and_offset_the_shift(thickness: float) -> None:
+    """What counts is how thick the network's part is, in units of how thick the drawn outline is inflated."""
     disc = canvas()
     bone = np.full(disc.sdf.shape, 0.02)
-    field = ellipsoid((size * RADIUS, size * RADIUS, thickness * size * RADIUS), (0, 0, 0.06))
-    front, back = column_extents(disc, [field])
-    own = inflate(np.isfinite(front), np.full(disc.sdf.shape, 4.0)) * PITCH**2
-    found = measure_profile(disc, disc.inside, front, back, own, bone)
+    field = ellipsoid((RADIUS, RADIUS, thickness * RADIUS), (0, 0, 0.06))
+    found = measure_profile(disc, torso(disc), [field], reference(disc), bone)
     assert found is not None
     assert found.ratio[middle_of(disc)] == pytest.approx(thickness**2, rel=0.1)
     assert found.offset[middle_of(disc)] == pytest.approx(0.04, abs=0.004)
@@ -80,16 +84,38 @@ def test_ratio_is_the_square_of_relative_thickness_and_offset_the_shift(thicknes
 
 def test_absurd_parts_are_bounded() -> None:
     disc = canvas()
-    front, back = column_extents(disc, [ellipsoid((0.3, 0.3, 0.9), (0, 0, 0.5))])
-    found = measure_profile(disc, disc.inside, front, back, reference(disc), np.zeros(disc.sdf.shape))
+    absurd = ellipsoid((0.21, 0.21, 0.9), (0, 0, 0.5))
+    found = measure_profile(disc, torso(disc), [absurd], reference(disc), np.zeros(disc.sdf.shape))
     assert found is not None
-    assert found.ratio.max() <= RATIO[1]
+    assert found.ratio.max() == pytest.approx(RATIO[1])
     assert found.offset[middle_of(disc)] == pytest.approx(OFFSET)
 
 
 def test_where_nothing_is_known_nothing_is_said() -> None:
     disc = canvas()
     far = ellipsoid((0.1, 0.1, 0.1), (3.0, 0, 0))
-    front, back = column_extents(disc, [far])
-    assert np.isnan(front).all()
-    assert measure_profile(disc, disc.inside, front, back, reference(disc), np.zeros(disc.sdf.shape)) is None
+    assert np.isnan(column_extents(disc, [far])[0]).all()
+    assert measure_profile(disc, torso(disc), [far], reference(disc), np.zeros(disc.sdf.shape)) is None
+
+
+def test_parts_that_do_not_explain_the_drawing_are_not_believed() -> None:
+    """A network that makes a stick of what is drawn as a disc knows nothing of it (pictograms, blobs)."""
+    disc = canvas()
+    stick = ellipsoid((0.05, 0.2, 0.2), (0, 0, 0.08))
+    found = measure_profile(disc, torso(disc), [stick], reference(disc), np.zeros(disc.sdf.shape))
+    assert found is not None
+    np.testing.assert_allclose(found.ratio, 1.0)
+    np.testing.assert_allclose(found.offset, 0.0)
+
+
+def test_a_head_has_one_ratio_and_one_offset() -> None:
+    """What an outline has of nose and hat is not repeated in depth, and a head is not sheared."""
+    disc = canvas()
+    field = ellipsoid((RADIUS, RADIUS, 0.18), (0, 0, 0.03))
+    head = replace(field, part=2, grid=field.grid + np.float32(0.02) * np.sin(40 * np.arange(NODES)).astype(np.float32))
+    labels = np.where(disc.inside, np.uint8(2), np.uint8(0))
+    found = measure_profile(disc, labels, [head], reference(disc), np.zeros(disc.sdf.shape))
+    assert found is not None
+    assert np.ptp(found.ratio) < 1e-9
+    assert np.ptp(found.offset) < 1e-9
+    assert found.offset.mean() == pytest.approx(0.03, abs=0.01)
