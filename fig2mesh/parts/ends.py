@@ -99,4 +99,6 @@ def clip_distance(canvas: Canvas, region: NDArray[np.bool_], ends: Ends) -> NDAr
     # What lies below the continuation is beyond the end as well.
     under = (np.arange(height)[:, None] > ends.source) & (ends.source >= 0) & ~region
     own = np.where(under, np.abs(own), own)
-    return np.asarray(np.where(np.abs(own - canvas.sdf) < 1.5 * canvas.pitch, canvas.sdf, own))
+    # The drawn contour is exact, but away from the layer it is another layer's.
+    drawn = (ndimage.distance_transform_edt(~region) < 3.0) & (np.abs(own - canvas.sdf) < 1.5 * canvas.pitch)
+    return np.asarray(np.where(drawn, canvas.sdf, own))

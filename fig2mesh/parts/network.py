@@ -16,6 +16,7 @@ from scipy import ndimage
 
 from fig2mesh.field.distance import grid_distance
 from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.kinds import KINDS, PART_KIND, anchor_joints, part_centre
 from fig2mesh.parts.split import Split
 from fig2mesh.records import BODY_PARTS, PART, BoolArray, FloatArray, PartSdf, Pose3D
@@ -147,7 +148,12 @@ def part_inference(
     nets = {kind: weights.load(kind).to(device) for kind in KINDS}
     sizes = shipped_sizes()
     joints = pose.joints.astype(np.float64)
-    return lambda canvas, divided: network_parts(canvas, divided, joints, nets, sizes, nodes)
+
+    def infer(canvas: Canvas, divided: Split) -> tuple[PartSdf, ...]:
+        with single_threaded():
+            return network_parts(canvas, divided, joints, nets, sizes, nodes)
+
+    return infer
 
 
 def shipped_sizes() -> dict[str, PartSizeNet]:

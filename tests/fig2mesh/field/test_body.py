@@ -211,3 +211,26 @@ def test_parts_far_apart_need_no_fillet():
     assert blend(a, b, 0.05) is None
     with pytest.raises(ValueError, match="smooth"):
         Body((a, b), ((0, 2, 0.1),))
+
+
+def test_fillets_made_elsewhere_are_those_made_here():
+    a = analytic.sample(analytic.capsule((-0.3, 0, 0), (0, 0, 0), 0.1), 3, (-0.15, 0, 0), 0.7, 48)
+    b = analytic.sample(analytic.capsule((0, 0, 0), (0, 0.3, 0), 0.1), 5, (0, 0.15, 0), 0.7, 48)
+    here, elsewhere = Body((a, b), ((0, 1, 0.08),)), Body((a, b), fillets=((0, 1, blend(a, b, 0.08)),))
+    points = points_about(4000, 7, 0.5)
+    for mine, theirs in zip(
+        here.evaluate(points, with_parts=True, with_gradients=True),
+        elsewhere.evaluate(points, with_parts=True, with_gradients=True),
+        strict=True,
+    ):
+        assert np.array_equal(mine, theirs)
+    assert set(elsewhere.nearest_part(points)) <= {0, 1}, "fillets belong to the parts that they join"
+
+
+def test_a_fillet_takes_nothing_away_whatever_its_grid_says():
+    body = pair()
+    absent = analytic.sample(lambda points: np.full(len(points), 0.5), 1, (0, 0, 0), 1.0, 8)
+    points = points_about(1000, 8)
+    assert np.array_equal(
+        Body(body.parts, fillets=((0, 1, absent),)).distance(points), Body(body.parts).distance(points)
+    )

@@ -34,7 +34,7 @@ def figures(draw: st.DrawFn) -> Drawn:
 
     def limb(names: tuple[str, ...], lengths: tuple[float, ...], outwards: float, low: int, high: int) -> None:
         """low, high : degrees from straight down, outwards, of the first bone; the others bend up to 60 from it."""
-        x, y = JOINTS[names[0]]
+        x, y = (float(place) for place in JOINTS[names[0]])
         angle = draw(st.integers(low, high))
         depth = 0.0
         for name, length in zip(names[1:], lengths, strict=True):
