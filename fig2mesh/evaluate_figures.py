@@ -23,7 +23,7 @@ from fig2mesh.parse.frame import image_frame
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import clean
 from fig2mesh.pipeline import steps
-from fig2mesh.placing import asset_from_figure
+from fig2mesh.placing import asset_from_figure, on_drawing
 from fig2mesh.settings import Settings
 
 LEVELS = 3
@@ -140,16 +140,15 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
 
     frame = image_frame(figure)
     asset = asset_from_figure(results["lift"], results["unwrap"][0].solid.vertices, FIGURE_HEIGHT)
-    x, y = frame.image_from_figure(asset.inverse().apply([[0.0, 0.0, 0.0]]))[0].tolist()
-    pixel = frame.units_per_px * float(asset.matrix[0, 0])
-    similar = front_similarity(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=(x, y))
-    missing = gap(model, figure.mask, metres_per_pixel=pixel, origin_px=(x, y))
+    pixel, origin_px = on_drawing(frame, asset)
+    similar = front_similarity(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    missing = gap(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     front, wall, shape, law = look(model), thinnest_wall(model), quality(model), laws(model)
     # FIGURE units are metres at this height.
     deviations = [level.deviation_m for level in levels] + [deviation(simplify(solid, COARSE), solid)]
     names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
     return {
-        "silhouette_iou": silhouette_iou(model, figure.mask, metres_per_pixel=pixel, origin_px=(x, y)),
+        "silhouette_iou": silhouette_iou(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
         "front_psnr_db": similar.psnr_db,
         "front_ssim": similar.ssim,
         "gap_share": missing.share,

@@ -146,7 +146,7 @@ def wall_share(front: FrontView) -> float:
 
 def thickness_at(mesh: Surface, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N,) thickness in metres of a closed surface, ASSET, at points (N, 2) x, y of the front view."""
-    scene, top = _scene(mesh)
+    scene, top = scene_of(mesh), _before(mesh)
     thickness = np.zeros(len(points))
     waiting = np.arange(len(points))
     # A line of sight through an edge can meet both its triangles or none: such lines are moved a little.
@@ -183,8 +183,8 @@ def _covered(mesh: Surface, points: NDArray[np.float64]) -> BoolArray:
     """(N,) bool, whether there is surface behind points (N, 2) of the front view."""
     import open3d as o3d
 
-    scene, top = _scene(mesh)
-    return np.asarray(scene.test_occlusions(o3d.core.Tensor.from_numpy(_lines(points, top))).numpy())
+    lines = o3d.core.Tensor.from_numpy(_lines(points, _before(mesh)))
+    return np.asarray(scene_of(mesh).test_occlusions(lines).numpy())
 
 
 def _lines(points: NDArray[np.float64], top: float) -> NDArray[np.float32]:
@@ -193,11 +193,16 @@ def _lines(points: NDArray[np.float64], top: float) -> NDArray[np.float32]:
     return rays
 
 
-def _scene(mesh: Surface) -> tuple[Any, float]:
-    """The surface for casting rays, and a z in front of all of it."""
+def _before(mesh: Surface) -> float:
+    """A z in front of all of a surface."""
+    return float(mesh.vertices[:, 2].max()) + 0.1
+
+
+def scene_of(mesh: Surface) -> Any:
+    """A surface for casting rays."""
     import open3d as o3d
 
     scene = o3d.t.geometry.RaycastingScene()
     corners = o3d.core.Tensor.from_numpy(np.array(mesh.vertices, np.float32))
     scene.add_triangles(corners, o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)))
-    return scene, float(mesh.vertices[:, 2].max()) + 0.1
+    return scene

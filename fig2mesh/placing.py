@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.paper import FIGURE_HEIGHT
+from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import JOINT, FloatArray, Pose3D
 from georef.frames import ASSET, FIGURE
 from georef.transform import Transform
@@ -35,3 +36,12 @@ def asset_from_figure(pose: Pose3D, vertices: FloatArray, height_m: float) -> Tr
 def _foot(pose: Pose3D, side: str) -> NDArray[np.float64]:
     ankle, foot = (pose.joints[JOINT[f"{side}_{joint}"]].astype(np.float64) for joint in ("ankle", "foot"))
     return np.asarray((ankle + foot) / 2)
+
+
+def on_drawing(frame: ImageFrame, asset: Transform) -> tuple[float, tuple[float, float]]:
+    """ASSET metres a pixel of the drawing, and the pixel (x, y) under the ASSET origin.
+
+    asset : ASSET from FIGURE
+    """
+    x, y = frame.image_from_figure(asset.inverse().apply(np.zeros((1, 3))))[0].tolist()
+    return frame.units_per_px * float(asset.matrix[0, 0]), (x, y)

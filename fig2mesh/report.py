@@ -8,14 +8,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from exporters.asset import Asset
 from fig2mesh import __version__
 from fig2mesh.doctor import PACKAGES, version
 from fig2mesh.measure import front_similarity, shape_measures, silhouette_iou
 from fig2mesh.parse.frame import image_frame
-from fig2mesh.placing import asset_from_figure
+from fig2mesh.placing import asset_from_figure, on_drawing
 from fig2mesh.settings import Settings
 
 
@@ -54,10 +52,7 @@ def make_report(
     figure = results["figure"]
     frame = image_frame(figure)
     transform = asset_from_figure(results["lift"], results["unwrap"][0].solid.vertices, height_m)
-    # The pixel under the ASSET origin: FIGURE (0, 0) is the pelvis, at frame.origin_px.
-    origin = frame.image_from_figure(transform.inverse().apply(np.zeros((1, 3))))[0]
-    pixel = frame.units_per_px * float(transform.matrix[0, 0])
-    origin_px = float(origin[0]), float(origin[1])
+    pixel, origin_px = on_drawing(frame, transform)
     front = front_similarity(asset.mesh, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     iou = silhouette_iou(asset.mesh, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     baked = results["bake"][0]

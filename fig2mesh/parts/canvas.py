@@ -83,8 +83,7 @@ def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: fl
     if not solid.any():
         solid = cover >= cover.max()
     solid = _without_pinholes(solid)
-    distance = ndimage.distance_transform_edt(~solid) - ndimage.distance_transform_edt(solid)
-    distance = ndimage.gaussian_filter(distance - 0.5 * np.sign(distance), 0.7)
+    distance = ndimage.gaussian_filter(raster_distance(solid), 0.7)
     # Smoothing by itself breaks lines of one pixel, hence the least radius.
     units = frame.units_per_px / scale
     distance = np.minimum(distance, thicken(solid, max(0.5 * thinnest / units, HAIR_PX)))
@@ -105,6 +104,12 @@ def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: fl
     first = np.array([(column[0] + 0.5) / scale - pad, (row[0] + 0.5) / scale - pad])
     x, y = frame.figure_from_image(first)
     return Canvas((sampled + beyond) * units, labels, (float(x), float(y)), float(step * units))
+
+
+def raster_distance(region: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Signed distance to the edges of pixels, pixels, negative inside."""
+    distance = ndimage.distance_transform_edt(~region) - ndimage.distance_transform_edt(region)
+    return np.asarray(distance - 0.5 * np.sign(distance))
 
 
 def _without_pinholes(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.canvas import Canvas, raster_distance
 
 DOWN = 0.65
 """Rims that look down at least this much (cosine) are ends; the others are sides."""
@@ -94,8 +94,7 @@ def clip_distance(canvas: Canvas, region: NDArray[np.bool_], ends: Ends) -> NDAr
     """(H, W) signed distance to the ends, FIGURE units: positive beyond them, far below zero away from them."""
     height = canvas.sdf.shape[0]
     beyond = ends.beyond
-    own = ndimage.distance_transform_edt(beyond) - ndimage.distance_transform_edt(~beyond)
-    own = ndimage.gaussian_filter(own - 0.5 * np.sign(own), HEM_BLUR / canvas.pitch)[:height] * canvas.pitch
+    own = ndimage.gaussian_filter(raster_distance(~beyond), HEM_BLUR / canvas.pitch)[:height] * canvas.pitch
     # What lies below the continuation is beyond the end as well.
     under = (np.arange(height)[:, None] > ends.source) & (ends.source >= 0) & ~region
     own = np.where(under, np.abs(own), own)

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.bones import Bones, core_bones, out_of_cloth
-from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.canvas import Canvas, raster_distance
 from fig2mesh.parts.depth import mid_surface, place_limb
 from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.profile import Profile, measure_profile
-from fig2mesh.parts.rim import RIM_BLUR, extended, raster_distance, rim_distance
+from fig2mesh.parts.rim import RIM_BLUR, extended, rim_distance
 from fig2mesh.parts.split import Layer, Split, closing
 from fig2mesh.records import JOINT, PART, PART_NAMES, PartSdf
 

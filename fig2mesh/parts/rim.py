@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.canvas import Canvas, raster_distance
 from fig2mesh.parts.ends import Ends
 
 RIM_BLUR = 0.012
@@ -44,12 +44,6 @@ def rim_distance(canvas: Canvas, region: NDArray[np.bool_], ends: Ends | None) -
     # Across a narrow gap the layer would reach into what is drawn on the other side.
     pieces, _ = ndimage.label(distance < 0, np.ones((3, 3)))
     return np.asarray(np.where(np.isin(pieces, pieces[region]), distance, np.abs(distance)))
-
-
-def raster_distance(region: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Signed distance to the edges of pixels, pixels, negative inside."""
-    distance = ndimage.distance_transform_edt(~region) - ndimage.distance_transform_edt(region)
-    return np.asarray(distance - 0.5 * np.sign(distance))
 
 
 def extended(distance: NDArray[np.float64], u: NDArray[np.float64], pitch: float) -> NDArray[np.float64]:

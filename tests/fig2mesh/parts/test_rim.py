@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from fig2mesh.parse.frame import image_frame
-from fig2mesh.parts.canvas import Canvas, make_canvas
+from fig2mesh.parts.canvas import Canvas, make_canvas, raster_distance
 from fig2mesh.parts.inflate import inflate
-from fig2mesh.parts.rim import LEAST_SLOPE, OVERLAP, RIM_BLUR, extended, raster_distance, rim_distance
+from fig2mesh.parts.rim import LEAST_SLOPE, OVERLAP, RIM_BLUR, extended, rim_distance
 from tests.drawn import Sketch
 
 PITCH = 0.008
