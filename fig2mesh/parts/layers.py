@@ -16,6 +16,7 @@ from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.profile import Profile, measure_profile
+from fig2mesh.parts.props import prop_depth
 from fig2mesh.parts.rim import RIM_BLUR, extended, rim_distance
 from fig2mesh.parts.split import Layer, Split, closing
 from fig2mesh.records import JOINT, PART, PART_NAMES, PartSdf
@@ -33,6 +34,8 @@ STANDING = 0.12
 
 NOOK = 0.045
 """Nooks of a head's outline up to twice this wide do not show in its depth, FIGURE units."""
+
+_FLAT = Bones(np.zeros((1, 2)), np.zeros(1), np.zeros(1))
 
 ATTEMPTS = 6
 """Each brings floating limbs half way back to the middle of the body; the last one all the way."""
@@ -75,6 +78,7 @@ def raise_layers(
     """
     loads = part_loads(joints)
     core, *others = divided.layers
+    props = [layer for layer in others if layer.limb is None]
     bones = core_bones(canvas, divided, joints)
     flat = _may_end_flat(canvas, divided, joints)
     make = _Inflation(canvas, loads, flat, device, fields)
@@ -83,7 +87,7 @@ def raise_layers(
     limbs: list[Limb | None] = [None]
     top, bottom = _extent(surfaces[0])
     legs_top, legs_bottom = np.full_like(top, np.nan), np.full_like(bottom, np.nan)
-    for layer in sorted(others, key=_drawn_order):
+    for layer in sorted((layer for layer in others if layer.limb is not None), key=_drawn_order):
         assert layer.limb is not None
         if layer.limb.is_arm:
             limb = place_limb(layer.limb, canvas, np.fmax(top, legs_top), np.fmin(bottom, legs_bottom), behind=True)
@@ -103,6 +107,13 @@ def raise_layers(
         above, below = _extent(surface)
         if not limb.is_arm:
             legs_top, legs_bottom = np.fmax(legs_top, above), np.fmin(legs_bottom, below)
+    for layer in props:
+        surface = make(layer, _FLAT)
+        half = np.sqrt(np.maximum(surface.u, 0.0))
+        depth = prop_depth(half, layer.shown, [_extent(other) for other in surfaces])
+        layers.append(layer)
+        limbs.append(None)
+        surfaces.append(replace(surface, z0=surface.z0 + depth))
     return _joined(canvas, layers, limbs, surfaces, make)
 
 
@@ -214,12 +225,16 @@ def _joined(
         if not loose:
             break
         for index in sorted(loose):
-            limb = limbs[index]
-            assert limb is not None
-            limbs[index] = limb = replace(limb, depth=(0.5 if attempt < ATTEMPTS - 1 else 0.0) * limb.depth)
+            share = 0.5 if attempt < ATTEMPTS - 1 else 0.0
             if attempt:
                 # Being at the same depth is not enough for layers that only meet at their rims.
                 layers[index] = _grown(canvas, layers[index])
+            limb = limbs[index]
+            if limb is None:
+                depth = share * surfaces[index].z0
+                surfaces[index] = replace(make(layers[index], _FLAT), z0=depth)
+                continue
+            limbs[index] = limb = replace(limb, depth=share * limb.depth)
             surfaces[index] = make(layers[index], Bones.of(limb))
     return tuple(surfaces)
 

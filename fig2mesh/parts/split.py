@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import LIMBS, STOUT, Limb, complete, make_limb, measure, stoutness
 from fig2mesh.parts.owners import owners
+from fig2mesh.parts.props import find_props
 from fig2mesh.records import JOINT, PART, BoolArray
 
 LAYERED_SHARE = 0.22
@@ -38,21 +39,23 @@ REACH_UNDER = 3
 class Layer:
     """One outline to inflate.
 
-    name : "core" or a limb's name
+    name : "core", a limb's name, or "prop" and a number
     region : (H, W) bool, completed outline, within the silhouette
     labels : (H, W) uint8, part label of every pixel of the region
-    limb : the chain, None for the core
+    limb : the chain, None for the core and props
+    shown : (H, W) bool, where the drawing shows it
     """
 
     name: str
     region: NDArray[np.bool_]
     labels: NDArray[np.uint8]
     limb: Limb | None
+    shown: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Split:
-    """The layers of a figure, back ones first where it matters, and all its limbs (also those in the core).
+    """The layers of a figure, the core first, props last, and all its limbs (also those in the core).
 
     garment : (H, W) bool, pixels of the core that hang around the legs
     labels : (H, W) uint8, the part that the drawing shows at each pixel
@@ -81,7 +84,10 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
     garment = np.zeros(inside.shape, bool)
     covered = {}
     for limb, other in zip(limbs, _twins(limbs), strict=True):
-        covered[limb.name] = np.zeros(len(limb.points), bool) if limb.is_arm else _under_cloth(limb, other, visible)
+        if limb.is_arm:
+            covered[limb.name] = np.zeros(len(limb.points), bool)
+        else:
+            covered[limb.name] = _under_cloth(limb, other, visible) | _labelled_cloth(limb, canvas)
     covered = _same_hem(limbs, covered)
     strictly = [_keep(limb, ~covered[limb.name]) for limb in limbs]
     bare = [_keep(limb, ~_shortened(covered[limb.name])) for limb in limbs]
@@ -114,6 +120,9 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
             garment &= ~stump
             owner[garment & (owner == index)] = 0
             owner[stump & (owner == 0)] = index
+    props = find_props(canvas)
+    for index, prop in enumerate(props, start=len(layered) + 1):
+        owner[prop.shown] = index
 
     layers: list[Layer] = []
     completed = owner == 0
@@ -122,20 +131,26 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         region = inside & ((owner == index) | (excess < 0))
         region = _with_chain(region, excess)
         computed = np.where(region, limb.part_of(nearest), np.uint8(0))
-        layers.append(Layer(limb.name, region, _as_given(computed, canvas, owner == index, limb.part), limb))
+        shown = owner == index
+        layers.append(Layer(limb.name, region, _as_given(computed, canvas, shown, limb.part), limb, shown))
         if limb.cloth:
             continue
         # Behind a limb the core goes on: inside the torso, around the root joint, and where it is on both sides.
         root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
         behind = closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
         completed |= inside & region & ((torso < 0) | root | behind)
+    for number, prop in enumerate(props, start=1):
+        labels = np.where(prop.region, np.uint8(PART["prop"]), np.uint8(0))
+        layers.append(Layer(f"prop-{number}", prop.region, labels, None, prop.shown))
+        wide = float(ndimage.distance_transform_edt(prop.region).max())
+        completed |= prop.region & ((torso < 0) | closing(owner == 0, 1.5 * wide))
     # Detached pieces that only a limb claimed but does not reach belong to the core, whatever is left of them.
     completed |= inside & ~np.logical_or.reduce([completed, *(layer.region for layer in layers)])
     core_labels = _core_labels(points, torso, head, merged, garment)
     taken = np.concatenate([np.zeros(0, np.uint8), *(limb.part for limb in layered)])
     own_parts = np.setdiff1d(np.arange(1, PART["hair"], dtype=np.uint8), taken)
     computed = np.where(completed, core_labels, np.uint8(0))
-    core = Layer("core", completed, _as_given(computed, canvas, owner == 0, own_parts), None)
+    core = Layer("core", completed, _as_given(computed, canvas, owner == 0, own_parts), None, owner == 0)
 
     labels = np.where(completed, core.labels, 0).astype(np.uint8)
     for index, layer in enumerate(layers, start=1):
@@ -251,6 +266,15 @@ def _under_cloth(limb: Limb, twin: Limb, visible: BoolArray) -> NDArray[np.bool_
         return none
     hem = int(deep[-1]) + 1
     return rows < (len(rows) if hem > ankle else hem)
+
+
+def _labelled_cloth(limb: Limb, canvas: Canvas) -> NDArray[np.bool_]:
+    """Which circles of a leg the label `garment` covers: from the hip down to the last one that has it."""
+    rows, columns = np.round(canvas.pixels(limb.points)).astype(int).T
+    height, width = canvas.labels.shape
+    there = canvas.labels[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] == PART["garment"]
+    below = np.logical_or.accumulate(there[::-1])[::-1]
+    return below if there.sum() > 0.5 * below.sum() else np.zeros_like(there)
 
 
 def _same_hem(limbs: list[Limb], covered: dict[str, NDArray[np.bool_]]) -> dict[str, NDArray[np.bool_]]:

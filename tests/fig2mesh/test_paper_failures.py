@@ -7,6 +7,7 @@ no depths of what it fails on, and a drawing says nothing of them but that a rou
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -359,16 +360,21 @@ SPLIT = "legs that the keypoints call visible are split off although nothing is 
 
 
 @pytest.mark.parametrize(
-    "hidden",
+    ("hidden", "labelled"),
     [
-        pytest.param(True, id="hidden legs"),
-        pytest.param(False, id="legs said to be seen", marks=pytest.mark.xfail(strict=True, reason=SPLIT)),
+        pytest.param(True, False, id="hidden legs"),
+        pytest.param(False, True, id="labelled garment"),
+        pytest.param(False, False, id="legs said to be seen", marks=pytest.mark.xfail(strict=True, reason=SPLIT)),
     ],
 )
-def test_a_block_without_limbs_has_no_legs_before_each_other(hidden: bool) -> None:
+def test_a_block_without_limbs_has_no_legs_before_each_other(hidden: bool, labelled: bool) -> None:
     """Nothing is drawn between the legs: the block is one body, the same on both sides."""
     sketch = Sketch(**APART).disc("head", 30).polygon((70, 70), (130, 70), (130, 290), (70, 290))
-    figure = assemble(sketch.figure(hidden=LEGS if hidden else ()))
+    drawn = sketch.figure(hidden=LEGS if hidden else ())
+    if labelled:
+        below = np.arange(len(drawn.mask))[:, None] > Sketch.SCALE * 150
+        drawn = replace(drawn, part_labels=np.where(drawn.mask & below, np.uint8(PART["garment"]), np.uint8(0)))
+    figure = assemble(drawn)
     random = np.random.default_rng(0)
     low, high = figure.body.bounds()
     points = random.uniform(low, high, (20_000, 3)).astype(np.float32)

@@ -96,7 +96,7 @@ def test_anchors_are_told_in_the_cube_and_specks_count_as_hidden(sizes: dict[str
     labels = np.zeros((SIDE, SIDE), np.uint8)
     labels[disc((0.3, 0.3), 0.2)] = L_HAND
     labels[10, 10:13] = R_HAND
-    layer = Layer("core", labels > 0, labels, None)
+    layer = Layer("core", labels > 0, labels, None, labels > 0)
     places = joints()
     inputs = network_inputs(blank(), Split((layer,), (), labels < 0, labels), places, sizes)
     assert inputs[L_HAND].mask.any()
