@@ -38,12 +38,16 @@ class Body:
     def __post_init__(self) -> None:
         object.__setattr__(self, "parts", tuple(self.parts))
         object.__setattr__(self, "smooth", tuple(self.smooth))
-        for first, second, radius in self.smooth:
-            if not (0 <= first < len(self.parts) and 0 <= second < len(self.parts) and first != second and radius > 0):
-                raise ValueError(
-                    f"smooth: {(first, second, radius)}, expected two different indices "
-                    f"below {len(self.parts)} and a positive radius"
-                )
+        object.__setattr__(self, "fillets", tuple(self.fillets))
+        for name, pairs in (("smooth", self.smooth), ("fillets", self.fillets)):
+            for first, second, _ in pairs:
+                if not (0 <= first < len(self.parts) and 0 <= second < len(self.parts) and first != second):
+                    raise ValueError(
+                        f"{name}: {(first, second)}, expected two different indices below {len(self.parts)}"
+                    )
+        for *_, radius in self.smooth:
+            if not radius > 0:
+                raise ValueError(f"smooth: radius {radius}, expected a positive one")
 
     @cached_property
     def grids(self) -> Grids:

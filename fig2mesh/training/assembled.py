@@ -188,16 +188,16 @@ def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
     joints = network.joints.copy()
     joints[:, 2] = truth.joints[:, 2] - truth.joints[JOINT["pelvis"], 2]
     made = _roads(truth, lift(truth.figure, frame), network)
-    made |= {GIVEN + road: parts for road, parts in _roads(truth, Pose3D(joints), Pose3D(joints)).items()}
+    made |= {GIVEN + road: body for road, body in _roads(truth, Pose3D(joints), Pose3D(joints)).items()}
     result = {}
-    for road, parts in made.items():
-        found = likeness(Body(parts), truth)
-        result[road] = Measured(found, part_ious(parts, truth, found.shift))
+    for road, body in made.items():
+        found = likeness(body, truth)
+        result[road] = Measured(found, part_ious(body.parts, truth, found.shift))
     return result
 
 
-def _roads(truth: Truth, ruled: Pose3D, pose: Pose3D) -> dict[str, tuple[PartSdf, ...]]:
-    """Parts by road; the outline has joints by rule, the others have those of the network."""
+def _roads(truth: Truth, ruled: Pose3D, pose: Pose3D) -> dict[str, Body]:
+    """Bodies by road; the outline has joints by rule, the others have those of the network."""
     from fig2mesh.parts.canvas import make_canvas
     from fig2mesh.parts.network import part_inference
     from fig2mesh.parts.outline import outline_parts
@@ -208,10 +208,12 @@ def _roads(truth: Truth, ruled: Pose3D, pose: Pose3D) -> dict[str, tuple[PartSdf
     canvas = make_canvas(truth.figure, image_frame(truth.figure), settings.canvas_px, 0.9 * settings.voxel)
     infer = part_inference(pose, settings.part_nodes)
     seen, voxel = truth.figure.visible, settings.voxel
+    outline = outline_parts(canvas, ruled, seen, voxel=voxel)
+    assembled = outline_parts(canvas, pose, seen, voxel=voxel, infer=infer)
     return {
-        ROADS[0]: outline_parts(canvas, ruled, seen, voxel=voxel).parts,
-        ROADS[1]: outline_parts(canvas, pose, seen, voxel=voxel, infer=infer).parts,
-        ROADS[2]: infer(canvas, divide(canvas, pose.joints.astype(np.float64), seen)),
+        ROADS[0]: Body(outline.parts, fillets=outline.fillets),
+        ROADS[1]: Body(assembled.parts, fillets=assembled.fillets),
+        ROADS[2]: Body(infer(canvas, divide(canvas, pose.joints.astype(np.float64), seen))),
     }
 
 

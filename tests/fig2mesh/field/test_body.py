@@ -179,6 +179,13 @@ def test_labels_follow_parts():
     assert pair().labels.tolist() == [1, 3]
 
 
+@pytest.mark.parametrize("pair", [(0, 2), (1, 1), (-1, 0)])
+def test_fillets_are_between_two_parts_that_are_there(pair):
+    parts = tuple(analytic.sample(analytic.sphere((x, 0, 0), 0.2), 1, (x, 0, 0), 0.8, 16) for x in (0.0, 0.3))
+    with pytest.raises(ValueError, match="fillets"):
+        Body(parts, fillets=((*pair, parts[0]),))
+
+
 def test_smooth_pairs_melt_together_and_only_they():
     a = analytic.sample(analytic.capsule((-0.3, 0, 0), (0, 0, 0), 0.1), 3, (-0.15, 0, 0), 0.7, 64)
     b = analytic.sample(analytic.capsule((0, 0, 0), (0, 0.3, 0), 0.1), 5, (0, 0.15, 0), 0.7, 64)
