@@ -13,7 +13,7 @@ from fig2mesh.field.distance import grid_distance
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.kinds import anchor_joints
-from fig2mesh.records import BODY_PARTS, JOINT, JOINT_NAMES, Figure, PartSdf, Pose3D
+from fig2mesh.records import BODY_PARTS, JOINT, JOINT_NAMES, Figure, Pose3D
 from fig2mesh.training.pack import Pack
 from fig2mesh.training.samples import scene
 from fig2mesh.training.sdf import signed_distance

@@ -39,17 +39,19 @@ def build(
     seed: int = 0,
     jobs: int = 1,
     pictures: bool = True,
+    shapes: bool = True,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
     """Make a folder of shards from a pack; what is there already, of the same recipe, is left as it is.
 
     bodies : of the training split; valid : of each of the two held-out splits, with dense grids
     pictures : add drawn pictures, labels, depth and UV images (four views of each body), which cost most of the space
+    shapes : add the parts' masks and distances, which cost most of the time; textures are learned without
     report : called with shards done and wanted
     """
     digest = hashlib.sha256(pack.read_bytes()).hexdigest() if pack.is_file() else ""
     load_pack(pack)
-    recipe = {"version": VERSION, "pack": digest, "seed": seed, "pictures": pictures}
+    recipe = {"version": VERSION, "pack": digest, "seed": seed, "pictures": pictures, "shapes": shapes}
     _check_recipe(out, recipe)
     tasks = []
     for split in SPLITS:
@@ -58,7 +60,7 @@ def build(
             rows = range(first, min(first + step, count))
             path = out / f"{split}-{index:05d}.npz"
             if not _complete(path, len(rows)):
-                tasks.append((str(pack), split, rows, seed, pictures, path))
+                tasks.append((str(pack), split, rows, seed, pictures, shapes, path))
     done = 0
     report(done, len(tasks))
     if jobs == 1:
@@ -122,7 +124,7 @@ def _complete(path: Path, rows: int) -> bool:
         return False
 
 
-def _shard(pack: str, split: str, rows: range, seed: int, pictures: bool, path: Path) -> None:
+def _shard(pack: str, split: str, rows: range, seed: int, pictures: bool, shapes: bool, path: Path) -> None:
     from fig2mesh.training.pictures import draw_views
     from fig2mesh.training.samples import geometry
 
@@ -133,7 +135,9 @@ def _shard(pack: str, split: str, rows: range, seed: int, pictures: bool, path: 
         number = seed * 1_000_000 + row
         subject = draw_subject(_PACK[pack], split, number)
         rng = np.random.default_rng([1, SPLITS.index(split), number])
-        arrays: dict[str, Any] = geometry(subject, rng, grids=split != "train")
+        arrays: dict[str, Any] = (
+            geometry(subject, rng, grids=split != "train") if shapes else {"joints": subject.joints}
+        )
         if pictures:
             arrays |= draw_views(subject, rng)
         arrays |= {"character": subject.character, "clip": subject.clip, "seed": number}

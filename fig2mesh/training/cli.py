@@ -19,7 +19,7 @@ KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
 """Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
 
-BUDGET_MIN = {"pose": 60.0, "size": 3.0, "parts": 45.0}
+BUDGET_MIN = {"pose": 60.0, "size": 3.0, "parts": 45.0, "uv": 40.0, "fill": 40.0}
 """Minutes a network where neither --budget nor --epochs is given: hours for everything on two cores."""
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -125,6 +125,34 @@ def parts(
             init=None if init is None else init / f"disn-{kind}-{variant}",
         )  # fmt: skip
         _say(scores)
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@click.option("--masks/--no-masks", default=True, show_default=True, help="Part masks are an input.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def uv(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, masks: bool) -> None:
+    """Texture coordinates (table 4)."""
+    from fig2mesh.nets.uv_unet import UvUnetShape
+    from fig2mesh.training.train_uv import train_uv
+
+    _say(train_uv(
+        data, out, shape=UvUnetShape(masks), budget_min=_minutes("uv", budget, epochs),
+        steps=None if epochs is None else 1000 * epochs, seed=seed, device=_device(device),
+    ))  # fmt: skip
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int) -> None:
+    """Where unseen texels take their colours."""
+    from fig2mesh.training.train_fill import train_fill
+
+    _say(train_fill(
+        data, out, budget_min=_minutes("fill", budget, epochs), steps=None if epochs is None else 1000 * epochs,
+        seed=seed, device=_device(device),
+    ))  # fmt: skip
 
 
 def add_to(cli: click.Group) -> None:

@@ -51,14 +51,15 @@ def pack(assets: Path | None, poses: int, seed: int, out: Path, overwrite: bool)
     "--valid", type=click.IntRange(0), default=48, show_default=True, metavar="N", help="Each held-out split."
 )
 @click.option("--pictures/--no-pictures", default=True, show_default=True, help="Drawn pictures, labels, depth, UV.")
+@click.option("--shapes/--no-shapes", default=True, show_default=True, help="Masks and distances of the parts.")
 @click.option("--seed", type=click.IntRange(0, 2000), default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, metavar="N")
-def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, seed: int, jobs: int) -> None:
+def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, shapes: bool, seed: int, jobs: int) -> None:
     """Samples from a pack: parts, distances, masks, joints and pictures from four sides."""
     from fig2mesh.training.build import build as run
 
     run(
-        pack, out, bodies=bodies, valid=valid, seed=seed, jobs=jobs, pictures=pictures,
+        pack, out, bodies=bodies, valid=valid, seed=seed, jobs=jobs, pictures=pictures, shapes=shapes,
         report=lambda done, total: click.echo(f"{done} of {total} shards", err=True),
     )  # fmt: skip
 

@@ -1,0 +1,105 @@
+"""Where in the drawing a point that it does not show takes its colour: the coordinate completion of paper §4.4.
+
+After Grigorev et al. 2019, *Coordinate-based texture inpainting for pose-guided image generation*: the network works in
+body texture space on places in the drawing, not on colours, so that what it gives is as sharp as the drawing. Ours is
+told for every texel where its point lies behind the drawing (seen or not), and changes that place: without any change
+the figure would be the same from behind as from the front, and that is where training starts.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from fig2mesh.errors import InputError
+from fig2mesh.nets import weights
+from fig2mesh.nets.hourglass import Hourglass
+
+CHANNELS: Final = 8
+"""place (2), there, seen, same (1 each), colour (3)."""
+
+LEARNED: Final = 8
+"""Channels of constants that the network learns for every texel: what is where on a body."""
+
+REACH: Final = 0.5
+"""Largest change of place along each axis, pictures (an edge is 2 long)."""
+
+
+@dataclass(frozen=True)
+class FillShape:
+    """size : texels of an edge; filters : of the first level."""
+
+    size: int = 128
+    filters: int = 32
+
+
+class TextureFill(nn.Module):
+    """(N, 8, S, S) of `fill_inputs` → (N, 2, S, S) change of place in the drawing, edges at -1 and 1."""
+
+    def __init__(self, shape: FillShape = FillShape()) -> None:
+        super().__init__()
+        self.shape = shape
+        self.constants = nn.Parameter(0.1 * torch.randn(1, LEARNED, shape.size, shape.size))
+        self.net = Hourglass(CHANNELS + LEARNED, 2, shape.filters)
+        self.net.start_at_zero()
+
+    def forward(self, inputs: Tensor) -> Tensor:
+        known = self.constants.expand(len(inputs), -1, -1, -1)
+        return REACH * torch.tanh(self.net(torch.cat([inputs, known], dim=1)))
+
+
+def fill_inputs(place: Tensor, there: Tensor, seen: Tensor, same: Tensor, colour: Tensor) -> Tensor:
+    """(N, 8, S, S) what the network takes.
+
+    Parameters
+    ----------
+    place : (N, 2, S, S) x, y of each texel's point in the drawing, edges at -1 and 1, y down
+    there : (N, S, S) whether the texel is known to be on the body at all
+    seen : (N, S, S) whether the drawing shows it
+    same : (N, S, S) whether the drawing shows the texel's own part at that place
+    colour : (N, 3, S, S) what the drawing shows at that place, 0-1
+    """
+    flags = torch.stack([there.float(), seen.float(), same.float()], dim=1)
+    return torch.cat([place, flags, 2 * colour - 1], dim=1) * there[:, None].float()
+
+
+def sample(picture: Tensor, place: Tensor) -> Tensor:
+    """(N, C, ...) bilinear values of pictures (N, C, H, W) at places (N, 2, ...), edges at -1 and 1; borders go on."""
+    return functional.grid_sample(
+        picture, place.movedim(1, 3), mode="bilinear", padding_mode="border", align_corners=False
+    )
+
+
+def fill_path(folder: Path = weights.FOLDER) -> Path:
+    """Where the weights are."""
+    return folder / "texture-fill.safetensors"
+
+
+def save_fill(path: Path, net: TextureFill, facts: Mapping[str, Any]) -> None:
+    """Write a network; its shape is put among the facts."""
+    weights.save(path, net.state_dict(), {**facts, "network": "texture-fill", "shape": asdict(net.shape)})
+
+
+def read_fill(path: Path) -> tuple[TextureFill, dict[str, Any]]:
+    """A network, ready for inference, and its facts."""
+    state, facts = weights.read(path)
+    try:
+        net = TextureFill(FillShape(**facts["shape"]))
+        net.load_state_dict(state)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        finding = f"not the weights of a texture network ({str(error).splitlines()[0]})"
+        raise InputError(path, finding, weights.REINSTALL) from None
+    return net.eval().requires_grad_(False), facts
+
+
+@functools.cache
+def load() -> TextureFill:
+    """The shipped network, read once a process."""
+    return read_fill(fill_path())[0]

@@ -1,0 +1,100 @@
+"""From what a camera sees of a body to texture coordinates: the network of paper §4.3, figure 5."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import torch
+from torch import Tensor
+
+from fig2mesh.errors import InputError
+from fig2mesh.nets import weights
+from fig2mesh.nets.hourglass import FILTERS, Hourglass
+from fig2mesh.records import BODY_PARTS
+
+SIZE: Final = 256
+"""Pixels of a picture's edge (paper §4.3)."""
+
+PARTS: Final = len(BODY_PARTS)
+
+SPAN: Final = 2.0
+"""Depths within half of this of the middle one are told apart, FIGURE units."""
+
+
+@dataclass(frozen=True)
+class UvUnetShape:
+    """masks : depth times the masks of the 14 parts goes in, instead of depth alone; filters : of the first level."""
+
+    masks: bool = True
+    filters: int = FILTERS
+
+    @property
+    def inputs(self) -> int:
+        return PARTS if self.masks else 1
+
+
+SHIPPED: Final = UvUnetShape()
+
+
+class UvUnet(Hourglass):
+    """(N, C, H, W) inputs → (N, 3, H, W): u, v, and the logit of the mask; H and W multiples of 16."""
+
+    def __init__(self, shape: UvUnetShape = SHIPPED) -> None:
+        super().__init__(shape.inputs, 3, shape.filters)
+        self.shape = shape
+
+
+def uv_inputs(depth: Tensor, labels: Tensor, masks: bool = True) -> Tensor:
+    """(N, 14 or 1, H, W) what the network takes.
+
+    depth : (N, H, W) VIEW z, FIGURE units, anything where nothing is seen
+    labels : (N, H, W) part labels; extras have no channel of their own and count in the depth alone
+    """
+    seen = labels > 0
+    values = torch.where(seen, depth, torch.nan)
+    middle = values.flatten(1).nanmedian(dim=1).values.nan_to_num()[:, None, None]
+    # Nothing is 0, so what is seen never is.
+    near = torch.where(seen, (0.55 + (depth - middle) / SPAN).clamp(0.1, 1.0), 0.0)
+    if not masks:
+        return near[:, None]
+    parts = torch.arange(1, PARTS + 1, device=labels.device)[None, :, None, None]
+    return near[:, None] * (labels[:, None] == parts)
+
+
+def infer_uv(net: UvUnet, depth: Tensor, labels: Tensor) -> Tensor:
+    """(N, 2, H, W) texture coordinates in [0, 1] of what is seen; see `uv_inputs`."""
+    with torch.no_grad():
+        found: Tensor = net(uv_inputs(depth, labels, net.shape.masks))[:, :2]
+    return found.clamp(0.0, 1.0)
+
+
+def uv_path(shape: UvUnetShape = SHIPPED, folder: Path = weights.FOLDER) -> Path:
+    """Where the weights are."""
+    return folder / f"uv-{'masks' if shape.masks else 'depth'}.safetensors"
+
+
+def save_uv(path: Path, net: UvUnet, facts: Mapping[str, Any]) -> None:
+    """Write a network; its shape is put among the facts."""
+    weights.save(path, net.state_dict(), {**facts, "network": "uv", "shape": asdict(net.shape)})
+
+
+def read_uv(path: Path) -> tuple[UvUnet, dict[str, Any]]:
+    """A network, ready for inference, and its facts."""
+    state, facts = weights.read(path)
+    try:
+        net = UvUnet(UvUnetShape(**facts["shape"]))
+        net.load_state_dict(state)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        finding = f"not the weights of a UV network ({str(error).splitlines()[0]})"
+        raise InputError(path, finding, weights.REINSTALL) from None
+    return net.eval().requires_grad_(False), facts
+
+
+@functools.cache
+def load() -> UvUnet:
+    """The shipped network, read once a process."""
+    return read_uv(uv_path())[0]

@@ -1,0 +1,88 @@
+"""The networks of textures: what goes in, what comes out, and what they give before they have learned."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import torch
+
+from fig2mesh.errors import InputError
+from fig2mesh.nets.hourglass import Hourglass
+from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, read_fill, sample, save_fill
+from fig2mesh.nets.uv_unet import PARTS, UvUnet, UvUnetShape, infer_uv, read_uv, save_uv, uv_inputs
+from fig2mesh.records import PART
+from fig2mesh.training.loop import seeded
+
+
+def test_a_picture_comes_out_as_large_as_it_went_in() -> None:
+    net = seeded(0, lambda: Hourglass(3, 2, 4)).eval()
+    assert net(torch.rand(2, 3, 32, 48)).shape == (2, 2, 32, 48)
+    net.start_at_zero()
+    assert not net(torch.rand(2, 3, 32, 48)).any()
+
+
+def test_depth_goes_into_the_channel_of_its_part() -> None:
+    labels = torch.zeros(1, 4, 4, dtype=torch.uint8)
+    labels[0, 0] = PART["torso"]
+    labels[0, 1] = PART["r_foot"]
+    labels[0, 2] = PART["garment"]
+    depth = torch.full((1, 4, 4), 0.3)
+    depth[0, 3] = -torch.inf
+    inputs = uv_inputs(depth, labels)
+    assert inputs.shape == (1, PARTS, 4, 4)
+    assert torch.isfinite(inputs).all()
+    assert (inputs[0, 0, 0] > 0).all()
+    assert (inputs[0, PART["r_foot"] - 1, 1] > 0).all()
+    assert not inputs[0, :, 2:].any()
+    assert (uv_inputs(depth, labels, masks=False)[0, 0, :3] > 0).all()
+
+
+def test_how_far_away_a_figure_stands_does_not_matter() -> None:
+    labels = torch.ones(1, 8, 8, dtype=torch.uint8)
+    depth = torch.rand(1, 8, 8)
+    torch.testing.assert_close(uv_inputs(depth, labels), uv_inputs(depth + 7, labels), atol=1e-5, rtol=0)
+
+
+def test_nothing_seen_is_no_error() -> None:
+    nothing = torch.zeros(1, 16, 16, dtype=torch.uint8)
+    assert not uv_inputs(torch.full((1, 16, 16), -torch.inf), nothing).any()
+
+
+def test_texture_coordinates_are_within_the_texture() -> None:
+    net = seeded(0, lambda: UvUnet(UvUnetShape(filters=4))).eval()
+    found = infer_uv(net, torch.rand(2, 32, 32), torch.ones(2, 32, 32, dtype=torch.uint8))
+    assert found.shape == (2, 2, 32, 32)
+    assert found.min() >= 0
+    assert found.max() <= 1
+
+
+def test_without_learning_the_back_is_the_front() -> None:
+    net = seeded(0, lambda: TextureFill(FillShape(16, 4))).eval()
+    place = torch.rand(1, 2, 16, 16) * 2 - 1
+    there = torch.ones(1, 16, 16, dtype=torch.bool)
+    inputs = fill_inputs(place, there, there, there, torch.rand(1, 3, 16, 16))
+    assert not net(inputs).any()
+
+
+def test_pictures_are_sampled_at_places() -> None:
+    columns = torch.arange(8.0).expand(1, 1, 8, 8)
+    centres = (torch.arange(8) + 0.5) / 4 - 1
+    place = torch.stack(torch.meshgrid(centres, centres, indexing="xy"))[None]
+    torch.testing.assert_close(sample(columns, place), columns)
+    assert sample(columns, place + 2).min() == 7, "beyond the border it goes on"
+
+
+def test_weights_are_read_as_they_were_written(tmp_path: Path) -> None:
+    for name, net, save, read in (
+        ("uv", UvUnet(UvUnetShape(False, 4)), save_uv, read_uv),
+        ("fill", TextureFill(FillShape(16, 4)), save_fill, read_fill),
+    ):
+        path = tmp_path / f"{name}.safetensors"
+        save(path, net, {"seed": 3})
+        found, facts = read(path)
+        assert facts["seed"] == 3
+        for key, value in net.state_dict().items():
+            torch.testing.assert_close(found.state_dict()[key].float(), value.float(), atol=1e-3, rtol=1e-3)
+        with pytest.raises(InputError, match="not the weights"):
+            (read_fill if name == "uv" else read_uv)(path)
