@@ -73,6 +73,20 @@ def figures(folder: Path, quality: str, parts: str, out: Path | None, json_: boo
         raise SystemExit(1)
 
 
+@evaluate.command()
+@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help="What `data build` made.")
+@click.option("--runs", type=FOLDER, metavar="DIR", help="What `train` made: networks that are not shipped.")
+@click.option("--bodies", type=click.IntRange(1), default=24, show_default=True, metavar="N", help="Each split.")
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def textures(source: Path, runs: Path | None, bodies: int, out: Path | None, overwrite: bool) -> None:
+    """Texture coordinates (table 4) and unseen sides, on clips and people that training never saw."""
+    from fig2mesh.training.evaluate_textures import evaluate_textures
+
+    _check(() if out is None else (out,), overwrite)
+    _write(evaluate_textures(source, runs, bodies, lambda line: click.echo(line, err=True)), out)
+
+
 def _check(paths: tuple[Path, ...], overwrite: bool) -> None:
     """Refuse outputs before the work begins; make their folder."""
     from fig2mesh.errors import OutputError

@@ -29,3 +29,6 @@ PART_IOU: Final = {
     "lower_leg": 83.66, "foot": 81.19,
 }  # fmt: skip
 """Kind → intersection over union in percent; table 3."""
+
+UV_SCORES: Final = {False: (0.014, 0.042), True: (0.011, 0.031)}
+"""Whether part masks are an input → MAE and RMSE of texture coordinates; table 4."""

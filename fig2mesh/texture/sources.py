@@ -17,6 +17,7 @@ from scipy.cluster.vq import kmeans2
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import JOINT, PART, Figure
+from fig2mesh.texture.pen import find_pen, reinked
 
 COLOURS = 12
 """Palette size; flat drawings have fewer, shaded ones lose little."""
@@ -73,6 +74,7 @@ def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_si
     palette, index = _palette(small, labels > 0, seed)
     pitch = frame.units_per_px * factor
     ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)
+    pen = find_pen(palette, index, ink, labels > 0)
 
     plain: dict[int, NDArray[np.float32]] = {}
     for surface in outline.layers:
@@ -80,7 +82,8 @@ def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_si
         own = np.isin(labels, parts)
         if not own.any():
             own = labels > 0
-        picture = _dominant(index, own, palette, ink, WINDOW / pitch)
+        kind = _dominant(index, own, ink, len(palette), WINDOW / pitch)
+        picture = reinked(palette, kind, own, pen)
         for part in parts:
             plain[part] = picture
     head = PART["head"]
@@ -151,14 +154,14 @@ def _ink(
 def _dominant(
     index: NDArray[np.int_],
     own: NDArray[np.bool_],
-    palette: NDArray[np.float32],
     weight: NDArray[np.float64],
+    count: int,
     radius: float,
-) -> NDArray[np.float32]:
-    """(h, w, 3) colour that dominates the neighbourhood among the pixels `own`; continued to the whole picture."""
+) -> NDArray[np.int_]:
+    """(h, w) index of the colour that dominates the neighbourhood among the pixels `own`; continued everywhere."""
     best = np.zeros(index.shape)
     chosen = np.zeros(index.shape, int)
-    for i in range(len(palette)):
+    for i in range(count):
         member = (own & (index == i)).astype(np.float32)
         if member.any():
             votes = weight[i] * ndimage.gaussian_filter(member, radius / 1.5)
@@ -168,7 +171,7 @@ def _dominant(
     if not reliable.any():
         reliable = own
     _, source = ndimage.distance_transform_edt(~reliable, return_indices=True)
-    return np.asarray(palette[chosen[tuple(source)]])
+    return np.asarray(chosen[tuple(source)])
 
 
 def _without_face(
@@ -189,7 +192,7 @@ def _without_face(
     hair = around & (index != skin) & (weight[index] > INK)
     if hair.sum() < LEAST_HAIR * head.sum():
         hair = around
-    behind = np.where(face[..., None], _dominant(index, hair, palette, weight, radius), picture)
+    behind = np.where(face[..., None], palette[_dominant(index, hair, weight, len(palette), radius)], picture)
     return np.asarray(ndimage.gaussian_filter(behind, (1.5, 1.5, 0)))
 
 

@@ -1,0 +1,87 @@
+"""A body from its four sides: front, left, back, right (paper §4.3, appendix B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fig2mesh.field.body import Body
+from fig2mesh.field.camera import VIEW_YAW_DEG, axes, images, orthographic
+from fig2mesh.field.trace import trace
+from fig2mesh.records import JOINT, PART, Pose3D
+
+SIZE: Final = 256
+FILLED: Final = 0.9
+"""Share of the picture's edge that the longer side of the body's box takes, as in the training pictures."""
+
+
+@dataclass(frozen=True)
+class Sides:
+    """What is seen from each side.
+
+    labels : (4, H, W) uint8, body parts (extras as the part that they cover), 0 where nothing is seen
+    depth : (4, H, W) float32, VIEW z, FIGURE units, -inf where nothing is seen
+    points : (4, H, W, 3) float32, FIGURE; zeros where nothing is seen
+    centre : (2,) FIGURE x, y in the middle of the front picture
+    pitch : FIGURE units of a pixel of the front picture
+    """
+
+    labels: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+    points: NDArray[np.float32]
+    centre: tuple[float, float]
+    pitch: float
+
+    def places(self) -> NDArray[np.float32]:
+        """(4, H, W, 2) x, y of each point in the front picture, edges at -1 and 1, y down."""
+        half = self.pitch * self.labels.shape[1] / 2
+        return np.asarray((self.points[..., :2] - np.array(self.centre)) / half * [1.0, -1.0], np.float32)
+
+
+def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
+    """The four sides of a body, each as large as fits."""
+    bounds = body.bounds().astype(np.float64)
+    centre = bounds.mean(axis=0)
+    labels, depths, points, pitches = [], [], [], []
+    for yaw in VIEW_YAW_DEG.values():
+        turn = axes(yaw)
+        extent = np.abs(turn) @ (bounds[1] - bounds[0])
+        pitch = float(extent[:2].max()) / (FILLED * size)
+        hits = trace(
+            body,
+            orthographic(yaw, size=(size, size), height=pitch * size, centre=centre, distance=float(extent[2])),
+            with_normals=False,
+        )
+        seen = images(hits, (size, size)).part_index
+        there = seen >= 0
+        place = np.where(there[..., None], hits.points.reshape(size, size, 3), np.float32(0))
+        part = np.where(there, body.labels[np.maximum(seen, 0)], np.uint8(0))
+        labels.append(body_labels(part, place, pose))
+        depths.append(np.where(there, place @ turn[2].astype(np.float32), -np.inf).astype(np.float32))
+        points.append(place)
+        pitches.append(pitch)
+    return Sides(np.stack(labels), np.stack(depths), np.stack(points), (float(centre[0]), float(centre[1])), pitches[0])
+
+
+def body_labels(labels: NDArray[np.uint8], points: NDArray[np.floating], pose: Pose3D) -> NDArray[np.uint8]:
+    """Labels with body parts in place of extras: networks learned bodies in clothes, not clothes.
+
+    Hair and hats count as head; cloth as what it covers: the trunk, or below the hips the leg of its side; what is
+    carried as nothing.
+    """
+    joints = pose.joints
+    result = np.where(labels == PART["hair"], np.uint8(PART["head"]), labels)
+    cloth = labels == PART["garment"]
+    if cloth.any():
+        hips = joints[[JOINT["l_hip"], JOINT["r_hip"]], :2].mean(axis=0)
+        knees = joints[[JOINT["l_knee"], JOINT["r_knee"]], 1].mean()
+        # The figure's left is to the right as the viewer sees it, unless its back is drawn.
+        mirrored = joints[JOINT["l_hip"], 0] < joints[JOINT["r_hip"], 0]
+        left = (points[..., 0] > hips[0]) != mirrored
+        leg = [np.where(left, PART[f"l_{kind}_leg"], PART[f"r_{kind}_leg"]) for kind in ("upper", "lower")]
+        covered = np.where(points[..., 1] > hips[1], PART["torso"], np.where(points[..., 1] > knees, *leg))
+        result = np.where(cloth, covered, result)
+    return np.where(labels == PART["prop"], np.uint8(0), result).astype(np.uint8)
