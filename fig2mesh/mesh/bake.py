@@ -1,7 +1,8 @@
 """Colours for the texture atlas (paper appendix C).
 
 Every texel is a point of the surface. Where the drawing sees that point, it takes the drawing's own pixel; elsewhere
-it takes the plain colours of its part. Seeing is decided on the mesh itself: a ray from the point towards the viewer
+it takes the plain colours of its part from where `Changes` tells, and where the drawing has contours, creases between
+limbs have the drawing's ink. Seeing is decided on the mesh itself: a ray from the point towards the viewer
 must leave freely, so that an arm in front of the chest does not smear onto it.
 """
 
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.field.body import Body
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, UvMesh
 from fig2mesh.texture.sources import Sources
@@ -23,6 +25,12 @@ that the border between seen and unseen runs evenly across triangles."""
 
 TURNED = -0.3
 """Triangles turned away further than this are not seen whatever their smooth normal says."""
+
+LINE_REACH = 0.8
+"""How far off the surface corners are looked for, widths of the line."""
+
+CORNER, CORNER_SOFT = 0.6, 0.2
+"""A point lies in a corner where the distance is below this share of how far one went, by a soft step."""
 
 CLEARANCE = 2e-3
 """Rays start this far off the surface, FIGURE units, so that they do not hit the face they start from."""
@@ -39,7 +47,13 @@ class Baked:
 
 
 def bake(
-    mesh: UvMesh, normals: FloatArray, face_parts: ByteArray, sources: Sources, frame: ImageFrame, size: int
+    mesh: UvMesh,
+    normals: FloatArray,
+    face_parts: ByteArray,
+    sources: Sources,
+    frame: ImageFrame,
+    size: int,
+    body: Body | None = None,
 ) -> Baked:
     """Bake the atlas of a mesh in FIGURE.
 
@@ -48,6 +62,7 @@ def bake(
     normals : (V, 3) float32 unit normals at the vertices of `mesh.solid`
     face_parts : (F,) uint8 part label of every triangle
     size : texels along each side of the square texture
+    body : whose creases are inked where the drawing has contours; None for none
     """
     owner, weights = rasterise(mesh.uv, mesh.faces, size)
     covered = owner >= 0
@@ -59,11 +74,15 @@ def bake(
     pixels = frame.image_from_figure(points)
     color = np.empty((len(face), 3))
     color[seen] = _bilinear(sources.seen, pixels[seen])
+    pixels[~seen] = frame.image_from_figure(points[~seen][:, :2] + sources.changes.at(points[~seen]))
     labels = face_parts[face]
     for label in np.unique(labels[~seen]):
         chosen = ~seen & (labels == label)
         picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
         color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
+    if body is not None and sources.pen is not None:
+        ink = crease_ink(body, points[~seen], normal[~seen], sources.pen.width)[:, None]
+        color[~seen] += ink * (sources.pen.colour - color[~seen])
     image = np.zeros((size, size, 3), np.uint8)
     image[covered] = np.clip(np.round(color), 0, 255).astype(np.uint8)
     observed = np.zeros((size, size), np.uint8)
@@ -90,6 +109,21 @@ def _seen(
     rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
     seen[seen] = ~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
     return np.asarray(seen)
+
+
+def crease_ink(
+    body: Body, points: NDArray[np.float64], normals: NDArray[np.float64], width: float
+) -> NDArray[np.float64]:
+    """(N,) how much ink there is on points of the surface: 1 in the corner between a limb and what it touches.
+
+    Off a flat or round surface the distance grows as fast as one goes; in a corner other surfaces are nearer.
+
+    width : of the line, FIGURE units
+    """
+    reach = LINE_REACH * width
+    unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    away = body.distance((points + reach * unit).astype(np.float32)).astype(np.float64)
+    return np.clip((CORNER - away / reach) / CORNER_SOFT + 0.5, 0.0, 1.0)
 
 
 def _bilinear(picture: NDArray[np.float32], pixels: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,8 @@ buttons, eyes. It is a mode filter over a small palette: at every pixel the colo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ from scipy.cluster.vq import kmeans2
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import JOINT, PART, Figure
-from fig2mesh.texture.pen import find_pen, reinked
+from fig2mesh.texture.changes import NO_CHANGES, Changes
+from fig2mesh.texture.pen import Pen, find_pen, reinked
 
 COLOURS = 12
 """Palette size; flat drawings have fewer, shaded ones lose little."""
@@ -54,15 +56,29 @@ class Sources:
     seen : (H, W, 3) float32 sRGB 0-255; the drawing, its colours continued beyond the silhouette
     plain : part label → (h, w, 3) float32, the colours that part has on its unseen sides
     plain_scale : IMAGE pixels → pixels of the plain pictures
+    changes : how far from straight behind the drawing unseen points find their colours
+    pen : of the drawing, its width in FIGURE units; None where it has no contours
     """
 
     seen: NDArray[np.float32]
     plain: dict[int, NDArray[np.float32]]
     plain_scale: float
+    changes: Changes = NO_CHANGES
+    pen: Pen | None = None
 
 
-def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_size: int, seed: int) -> Sources:
-    """The drawing and its plain version for each part of `outline`."""
+def make_sources(
+    figure: Figure,
+    frame: ImageFrame,
+    outline: Outline,
+    texture_size: int,
+    seed: int,
+    ask: Callable[[NDArray[np.float32]], Changes] | None = None,
+) -> Sources:
+    """The drawing and its plain version for each part of `outline`.
+
+    ask : what tells from the picture with its colours continued where unseen points find theirs
+    """
     seen = _continued(figure.rgba, figure.mask)
     # A whole factor is the same in both directions, so that one number maps pixels.
     factor = max(1, int(max(figure.mask.shape) / (PLAIN_SHARE * texture_size)))
@@ -90,7 +106,8 @@ def make_sources(figure: Figure, frame: ImageFrame, outline: Outline, texture_si
     if head in plain:
         face, radius = _face(figure, frame, outline, points)
         plain[head] = _without_face(plain[head], labels == head, face, index, palette, ink, 0.5 * radius / pitch)
-    return Sources(seen, plain, 1.0 / factor)
+    changes = NO_CHANGES if ask is None else ask(seen)
+    return Sources(seen, plain, 1.0 / factor, changes, None if pen is None else replace(pen, width=pen.width * pitch))
 
 
 def _continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:

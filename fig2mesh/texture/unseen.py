@@ -7,18 +7,17 @@ so that all of them are the drawing's own and as sharp.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from fig2mesh.nets.texture_fill import TextureFill, fill_inputs, sample
 from fig2mesh.nets.uv_unet import UvUnet, infer_uv
 from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.texture.changes import Changes
 from fig2mesh.texture.sides import Sides
 from fig2mesh.texture.space import spread
 
@@ -27,30 +26,6 @@ INNER_PX: Final = 5.0
 
 LEAST_PX: Final = 1.5
 """Pixels nearer to the silhouette are seen at too much of a slant to tell anything."""
-
-NEIGHBOURS: Final = 6
-"""Points of the four sides whose changes are averaged."""
-
-
-@dataclass(frozen=True)
-class Changes:
-    """How far from straight behind the drawing colours are found.
-
-    points : (N, 3) float32, FIGURE, on the surface; change : (N, 2) float32, FIGURE x, y
-    """
-
-    points: NDArray[np.float32]
-    change: NDArray[np.float32]
-
-    def at(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(M, 2) changes at points (M, 3) of the surface."""
-        if not len(self.points):
-            return np.zeros((len(points), 2))
-        count = min(NEIGHBOURS, len(self.points))
-        distance, index = cKDTree(self.points).query(np.asarray(points, np.float64), k=count)
-        distance, index = distance.reshape(len(points), count), index.reshape(len(points), count)
-        weight = 1.0 / (distance + 1e-3) ** 2
-        return np.asarray(np.einsum("nk,nkd->nd", weight, self.change[index]) / weight.sum(axis=1)[:, None])
 
 
 def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: Sides) -> NDArray[np.float32]:

@@ -19,7 +19,7 @@ KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
 """Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
 
-BUDGET_MIN = {"pose": 60.0, "size": 3.0, "parts": 45.0, "uv": 40.0, "fill": 40.0}
+BUDGET_MIN = {"pose": 60.0, "size": 3.0, "parts": 45.0, "uv": 40.0, "fill": 40.0, "refine": 40.0, "head": 20.0}
 """Minutes a network where neither --budget nor --epochs is given: hours for everything on two cores."""
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -155,6 +155,37 @@ def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device
     ))  # fmt: skip
 
 
+def filled(command: Callable[..., None]) -> Callable[..., None]:
+    """The option --fill."""
+    return click.option("--fill", type=FOLDER, required=True, metavar="DIR", help="What `train fill` made.")(command)
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@filled
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def refine(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
+    """Details of unseen sides."""
+    from fig2mesh.training.train_refine import train_refine
+
+    _check_cpu(device)
+    steps = None if epochs is None else 1000 * epochs
+    _say(train_refine(data, fill, out, budget_min=_minutes("refine", budget, epochs), steps=steps, seed=seed))
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@filled
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def head(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
+    """Heads of unseen sides."""
+    from fig2mesh.training.train_refine import train_head
+
+    _check_cpu(device)
+    steps = None if epochs is None else 1000 * epochs
+    _say(train_head(data, fill, out, budget_min=_minutes("head", budget, epochs), steps=steps, seed=seed))
+
+
 def add_to(cli: click.Group) -> None:
     """Make `train` a command of `cli`."""
     cli.add_command(train)
@@ -172,6 +203,11 @@ def _device(name: str) -> str:
     if name == "auto":
         return "cuda" if torch.cuda.is_available() else "cpu"
     return name
+
+
+def _check_cpu(name: str) -> None:
+    if name == "cuda":
+        raise InputError("--device cuda", "this network is trained on the CPU", "leave it out")
 
 
 def _pack(data: Path) -> Pack:

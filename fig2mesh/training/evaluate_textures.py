@@ -21,9 +21,10 @@ from fig2mesh.nets.texture_fill import TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, uv_path
 from fig2mesh.paper import UV_SCORES
 from fig2mesh.records import JOINT, PART, Pose3D
+from fig2mesh.texture.changes import Changes
 from fig2mesh.texture.sides import Sides, body_labels
 from fig2mesh.texture.space import spread
-from fig2mesh.texture.unseen import Changes, unseen_changes
+from fig2mesh.texture.unseen import unseen_changes
 from fig2mesh.training.build import read_shard, shards
 from fig2mesh.training.evaluate import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.texture_data import Drawings, load_drawings

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import colorsys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
 from fig2mesh.errors import InputError
+from fig2mesh.nets.head_hsv import HeadHsv, HeadShape, disc_value, enhance, read_head, rgb_of, save_head
 from fig2mesh.nets.hourglass import Hourglass
 from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, read_fill, sample, save_fill
 from fig2mesh.nets.uv_unet import PARTS, UvUnet, UvUnetShape, infer_uv, read_uv, save_uv, uv_inputs
+from fig2mesh.nets.view_refine import RefineShape, ViewRefine, read_refine, refine, save_refine
 from fig2mesh.records import PART
 from fig2mesh.training.loop import seeded
 
@@ -73,10 +77,61 @@ def test_pictures_are_sampled_at_places() -> None:
     assert sample(columns, place + 2).min() == 7, "beyond the border it goes on"
 
 
+COLOURS = torch.rand(1, 3, 40, 40, generator=torch.Generator().manual_seed(0))
+
+
+def test_colours_survive_the_disc() -> None:
+    torch.testing.assert_close(rgb_of(disc_value(COLOURS)), COLOURS, atol=1e-5, rtol=0)
+    found = disc_value(COLOURS)[0].reshape(3, -1).T.numpy()
+    for colour, (x, y, value) in zip(COLOURS[0].reshape(3, -1).T.tolist()[:200], found[:200], strict=True):
+        hue, saturation, brightness = colorsys.rgb_to_hsv(*colour)
+        angle = 2 * np.pi * hue
+        np.testing.assert_allclose((x, y, value), (saturation * np.cos(angle), saturation * np.sin(angle), brightness),
+                                   atol=1e-5)  # fmt: skip
+
+
+def test_greys_have_no_hue() -> None:
+    grey = torch.full((1, 3, 2, 2), 0.4)
+    assert not disc_value(grey)[:, :2].any()
+    torch.testing.assert_close(rgb_of(disc_value(grey)), grey)
+
+
+def test_only_heads_are_made_anew() -> None:
+    net = seeded(0, lambda: HeadHsv(HeadShape(4, 8))).eval()
+    rgb = torch.rand(2, 3, 96, 96)
+    head = torch.zeros(2, 96, 96, dtype=torch.bool)
+    head[0, 10:40, 30:62] = True
+    found = enhance(net, rgb, torch.rand(2, 2, 96, 96), head)
+    assert torch.equal(found[1], rgb[1])
+    assert torch.equal(found[0][:, ~head[0]], rgb[0][:, ~head[0]])
+
+
+def test_an_untrained_head_network_gives_heads_as_they_are() -> None:
+    """Up to the resampling there and back, of a head that has about as many pixels as the network."""
+    net = seeded(0, lambda: HeadHsv(HeadShape(4, 8))).eval()
+    ramp = torch.linspace(0.2, 0.8, 96)
+    rgb = torch.stack([ramp.expand(96, 96), ramp[:, None].expand(96, 96), 0 * ramp.expand(96, 96) + 0.5])[None]
+    head = torch.zeros(1, 96, 96, dtype=torch.bool)
+    head[0, 18:74, 20:76] = True
+    found = enhance(net, rgb, torch.zeros(1, 2, 96, 96), head)
+    inner = torch.zeros_like(head)
+    inner[0, 21:71, 23:73] = True
+    torch.testing.assert_close(found[0][:, inner[0]], rgb[0][:, inner[0]], atol=0.02, rtol=0)
+
+
+def test_an_untrained_refining_network_changes_nothing() -> None:
+    net = seeded(0, lambda: ViewRefine(RefineShape(4))).eval()
+    painted, uv = torch.rand(1, 3, 32, 32), torch.rand(1, 2, 32, 32)
+    labels = torch.ones(1, 32, 32, dtype=torch.uint8)
+    assert torch.equal(refine(net, painted, uv, torch.rand(1, 32, 32), labels), painted)
+
+
 def test_weights_are_read_as_they_were_written(tmp_path: Path) -> None:
     for name, net, save, read in (
         ("uv", UvUnet(UvUnetShape(False, 4)), save_uv, read_uv),
         ("fill", TextureFill(FillShape(16, 4)), save_fill, read_fill),
+        ("refine", ViewRefine(RefineShape(4)), save_refine, read_refine),
+        ("head", HeadHsv(HeadShape(4, 8)), save_head, read_head),
     ):
         path = tmp_path / f"{name}.safetensors"
         save(path, net, {"seed": 3})

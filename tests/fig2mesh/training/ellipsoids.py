@@ -12,6 +12,9 @@ from fig2mesh.records import PART
 from fig2mesh.training.texture_data import Drawings
 
 SIZE = 64
+QUARTERS = (("head", "torso"), ("l_foot", "r_foot"))
+"""Parts above and below, left and right."""
+
 FRONT, BACK = (200, 60, 40), (40, 60, 200)
 
 
@@ -32,7 +35,7 @@ def ellipsoid(radii: tuple[float, float, float]) -> dict[str, NDArray[np.generic
         u = 0.5 + np.arctan2(points[..., 0] / radius[0], points[..., 2] / radius[2]) / (2 * np.pi)
         v = 0.5 - points[..., 1] / (2 * radius[1])
         left = points[..., 0] > 0
-        upper, lower = (np.where(left, *(PART[f"{side}_{part}"] for side in "lr")) for part in ("hand", "foot"))
+        upper, lower = (np.where(left, *(PART[name] for name in names)) for names in QUARTERS)
         labels = np.where(points[..., 1] > 0, upper, lower)
         colour = np.where(points[..., 2:] >= 0, FRONT, BACK)
         out["labels"].append(np.where(seen, labels, 0).astype(np.uint8))

@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 
 from fig2mesh.errors import FigureError
+from fig2mesh.nets.head_hsv import HeadShape, head_path, read_head
 from fig2mesh.nets.texture_fill import fill_path, read_fill
 from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
+from fig2mesh.nets.view_refine import read_refine, refine_path
 from fig2mesh.records import PART
 from fig2mesh.texture.space import spread
 from fig2mesh.training.texture_data import load_drawings
 from fig2mesh.training.train_fill import train_fill
+from fig2mesh.training.train_refine import train_head, train_refine
 from fig2mesh.training.train_uv import train_uv
 from fig2mesh.training.unfold import places, unfold
-from tests.fig2mesh.training.ellipsoids import BACK, FRONT, SIZE, drawings, ellipsoid, write_shards
+from tests.fig2mesh.training.ellipsoids import BACK, FRONT, QUARTERS, SIZE, drawings, ellipsoid, write_shards
 
 RADII = (0.5, 0.8, 0.3)
 
@@ -59,7 +62,7 @@ def test_texture_space_knows_front_and_back_apart() -> None:
         assert np.abs(bodies.truth[there].astype(int) - colour).max() < 8
     assert not bodies.seen[..., from_front > 0.3].any()
     assert bodies.same[bodies.there].mean() > 0.9
-    assert set(np.unique(bodies.part)) == {0, *(PART[f"{side}_{part}"] for side in "lr" for part in ("hand", "foot"))}
+    assert set(np.unique(bodies.part)) == {0, *(PART[name] for names in QUARTERS for name in names)}
 
 
 def test_bodies_without_texture_coordinates_are_left_out(tmp_path: Path) -> None:
@@ -91,10 +94,16 @@ def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: 
     assert errors[True] < 0.7 * errors[False]
 
 
-def test_a_network_learns_to_take_colours_from_elsewhere(data: Path, tmp_path: Path) -> None:
-    """It cannot find the colour of the back in the front, but it must not do worse than straight through."""
+def test_networks_of_unseen_sides_learn_one_after_the_other(data: Path, tmp_path: Path) -> None:
+    """Coordinates cannot find the colour of the back in the front; the refining networks can learn it."""
     found = train_fill(data, tmp_path, steps=20)
     assert found["valid-clips_psnr"] > found["valid-clips_front_psnr"] - 0.1
     net, facts = read_fill(fill_path(tmp_path))
     assert net.shape.size == 128
     assert facts["bodies"] == 12
+    found = train_refine(data, tmp_path, tmp_path / "refine", steps=150, filters=8)
+    assert found["valid-clips_mae"] < 0.9 * found["valid-clips_painted_mae"]
+    assert read_refine(refine_path(tmp_path / "refine"))[1]["scores"] == found
+    found = train_head(data, tmp_path, tmp_path / "head", steps=10, batch=4, shape=HeadShape(4, 8))
+    assert 0 < found["valid-clips_mae"] < 1
+    assert read_head(head_path(tmp_path / "head"))[1]["scores"] == found

@@ -1,0 +1,111 @@
+"""Four sides of a body, and what networks change of where unseen points find their colours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from fig2mesh.field import analytic
+from fig2mesh.field.body import Body
+from fig2mesh.field.camera import VIEW_YAW_DEG, axes
+from fig2mesh.nets.texture_fill import FillShape, TextureFill
+from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
+from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.records import JOINT, JOINT_NAMES, PART, Pose3D
+from fig2mesh.texture.changes import NO_CHANGES, Changes
+from fig2mesh.texture.sides import FILLED, Sides, body_labels, look_around
+from fig2mesh.texture.unseen import front_picture, unseen_changes
+from fig2mesh.training.loop import seeded
+
+SIZE = 64
+POSE = Pose3D(np.zeros((len(JOINT_NAMES), 3), np.float32))
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    head = analytic.sample(analytic.sphere((0.1, 0.6, 0.05), 0.2), PART["head"], (0.1, 0.6, 0.05), 0.6, 64)
+    trunk = analytic.sample(analytic.capsule((0, -0.3, 0), (0, 0.3, 0), 0.25), PART["torso"], (0, 0, 0), 1.4, 96)
+    return Body((head, trunk))
+
+
+@pytest.fixture(scope="module")
+def sides(body: Body) -> Sides:
+    return look_around(body, POSE, SIZE)
+
+
+def test_sides_show_the_surface(body: Body, sides: Sides) -> None:
+    seen = sides.labels > 0
+    assert np.abs(body.distance(sides.points[seen])).max() < 2e-3
+    for view, yaw in enumerate(VIEW_YAW_DEG.values()):
+        depth = sides.points[view] @ axes(yaw)[2]
+        np.testing.assert_allclose(depth[seen[view]], sides.depth[view][seen[view]], atol=1e-5)
+    assert not np.isfinite(sides.depth[~seen]).any()
+
+
+def test_sides_are_framed_as_training_pictures_are(sides: Sides) -> None:
+    for view in sides.labels:
+        rows, columns = (np.flatnonzero((view > 0).any(axis=axis)) for axis in (1, 0))
+        longest = max(np.ptp(rows), np.ptp(columns)) + 1
+        assert longest == pytest.approx(FILLED * SIZE, abs=2.5)
+        assert (rows[0] + rows[-1] + 1) / 2 == pytest.approx(SIZE / 2, abs=1)
+
+
+def test_places_in_front_are_pixels(sides: Sides) -> None:
+    along = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
+    seen = sides.labels[0] > 0
+    x, y = np.meshgrid(along, along)
+    np.testing.assert_allclose(sides.places()[0][seen], np.stack([x, y], axis=-1)[seen], atol=1e-4)
+    # From behind left and right are the other way round.
+    back = sides.labels[2] > 0
+    np.testing.assert_allclose(sides.places()[2][back][:, 0], -x[back], atol=1e-4)
+
+
+def test_extras_count_as_what_they_cover() -> None:
+    joints = np.zeros((len(JOINT_NAMES), 3), np.float32)
+    for side, x in (("l", 0.1), ("r", -0.1)):
+        joints[JOINT[f"{side}_hip"]] = (x, 0.0, 0)
+        joints[JOINT[f"{side}_knee"]] = (x, -0.4, 0)
+    points = np.array([[0, 0.2, 0], [0.1, -0.2, 0], [-0.1, -0.2, 0], [0.1, -0.6, 0], [-0.1, -0.6, 0]])
+    labels = np.full(5, PART["garment"], np.uint8)
+    wanted = [PART[n] for n in ("torso", "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg")]
+    assert body_labels(labels, points, Pose3D(joints)).tolist() == wanted
+    turned = Pose3D(joints * np.array([-1, 1, 1], np.float32))
+    assert body_labels(labels, points, turned)[1] == PART["r_upper_leg"], "seen from behind"
+    others = np.array([PART["hair"], PART["prop"], 0, PART["l_hand"]], np.uint8)
+    assert body_labels(others, points[:4], POSE).tolist() == [PART["head"], 0, 0, PART["l_hand"]]
+
+
+def test_the_front_picture_is_the_drawing_in_the_frame_of_the_sides(sides: Sides) -> None:
+    frame = ImageFrame((50.0, 60.0), 0.01)
+    columns = np.arange(100, dtype=np.float32) + 0.5
+    picture = np.broadcast_to(columns[None, :, None], (120, 100, 3)).copy()
+    found = front_picture(picture, frame, sides)
+    seen = sides.labels[0] > 0
+    x = frame.image_from_figure(sides.points[0][seen][:, :2].astype(np.float64))[:, 0]
+    np.testing.assert_allclose(found[seen][:, 0], np.clip(x, 0.5, 99.5), atol=0.6)
+
+
+def test_untrained_networks_change_nothing(sides: Sides) -> None:
+    uv_net = seeded(0, lambda: UvUnet(UvUnetShape(filters=4))).eval()
+    fill_net = seeded(0, lambda: TextureFill(FillShape(32, 4))).eval()
+    found = unseen_changes(sides, np.zeros((SIZE, SIZE, 3), np.float32), uv_net, fill_net)
+    assert len(found.points) > 1000
+    assert not found.change.any()
+
+
+def test_a_change_in_texture_space_moves_points_by_as_much(sides: Sides) -> None:
+    uv_net = seeded(0, lambda: UvUnet(UvUnetShape(filters=4))).eval()
+    fill_net = seeded(0, lambda: TextureFill(FillShape(32, 4))).eval()
+    with torch.no_grad():
+        fill_net.net.last[1].bias[:4] = 0.1
+    found = unseen_changes(sides, np.zeros((SIZE, SIZE, 3), np.float32), uv_net, fill_net)
+    step = 0.5 * np.tanh(0.1) * sides.pitch * SIZE / 2
+    np.testing.assert_allclose(found.change, np.broadcast_to([step, 0.0], found.change.shape), atol=1e-5)
+
+
+def test_changes_are_those_of_the_nearest_points() -> None:
+    changes = Changes(np.array([[0, 0, 0], [1, 0, 0]], np.float32), np.array([[0.1, 0], [0, 0.3]], np.float32))
+    np.testing.assert_allclose(changes.at(np.array([[0.0, 0, 0], [1, 0, 0]])), [[0.1, 0], [0, 0.3]], atol=1e-5)
+    np.testing.assert_allclose(changes.at(np.array([[0.5, 0.2, 0]])), [[0.05, 0.15]], atol=1e-6)
+    assert not NO_CHANGES.at(np.ones((3, 3))).any()
