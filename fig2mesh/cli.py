@@ -91,6 +91,10 @@ def cli() -> None:
     "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
     help="What depths come from: networks, or rules and the outline alone.",
 )  # fmt: skip
+@click.option(
+    "--textures", type=click.Choice(["network", "plain"]), default="network", show_default=True,
+    help="Unseen sides find their colours where networks tell, or straight behind the drawing.",
+)  # fmt: skip
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)

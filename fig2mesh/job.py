@@ -50,6 +50,7 @@ def run(
     lods: int,
     visible_from: float,
     parts: str,
+    textures: str,
     mesher: str,
     closing: str,
     device: str,
@@ -82,7 +83,7 @@ def run(
         lods = 1
     settings = settings_for(
         quality, triangles=triangles, texture_size=texture_size, lods=lods, mesher=mesher, closing=closing,
-        parts=parts, device=_device(device), seed=seed,
+        parts=parts, textures=textures, device=_device(device), seed=seed,
     )  # fmt: skip
     stages = None if save_stages is None else _stages(save_stages, drawn, settings, resume_from)
 

@@ -27,9 +27,11 @@ from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.placing import asset_from_figure
 from fig2mesh.pose.network import lift_by_network
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import ByteArray, Figure, Mesh, PointCloud, Pose3D, UvMesh
+from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh, PointCloud, Pose3D, UvMesh
 from fig2mesh.settings import Settings
-from fig2mesh.texture.sources import make_sources
+from fig2mesh.texture.changes import Changes
+from fig2mesh.texture.sources import Sources, make_sources
+from fig2mesh.texture.views import ViewTextures
 
 LEAST_TEXELS = 128
 
@@ -82,9 +84,19 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
     def unwrap_levels(levels: tuple[Mesh, ...]) -> tuple[UvMesh, ...]:
         return tuple(unwrap(mesh, texture_size=_texels(settings, level)) for level, mesh in enumerate(levels))
 
-    def bake_levels(figure: Figure, outline: Outline, body: Body, unwrapped: tuple[UvMesh, ...]) -> tuple[Baked, ...]:
+    def find_colours(figure: Figure, pose: Pose3D, outline: Outline, body: Body) -> Sources:
         frame = image_frame(figure)
-        sources = make_sources(figure, frame, outline, settings.texture_size, settings.seed)
+
+        def ask(picture: FloatArray) -> tuple[Changes, ViewTextures]:
+            from fig2mesh.texture.unseen import shipped, unseen_sides
+
+            return unseen_sides(body, pose, picture, frame, shipped())
+
+        inferred = settings.textures == "network"
+        return make_sources(figure, frame, outline, settings.texture_size, settings.seed, ask if inferred else None)
+
+    def bake_levels(figure: Figure, sources: Sources, body: Body, unwrapped: tuple[UvMesh, ...]) -> tuple[Baked, ...]:
+        frame = image_frame(figure)
         return tuple(
             bake(
                 mesh,
@@ -93,6 +105,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
                 sources,
                 frame,
                 _texels(settings, level),
+                body,
             )
             for level, mesh in enumerate(unwrapped)
         )
@@ -132,7 +145,8 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         *meshing,
         Step("simplify", ("solid",), simplify_levels),
         Step("unwrap", ("simplify",), unwrap_levels),
-        Step("bake", ("figure", "parts", "body", "unwrap"), bake_levels),
+        Step("textures", ("figure", "lift", "parts", "body"), find_colours, kept=False),
+        Step("bake", ("figure", "textures", "body", "unwrap"), bake_levels),
         Step("model", ("lift", "body", "solid", "unwrap", "bake"), finish, kept=False),
     )
 

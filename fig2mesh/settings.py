@@ -9,6 +9,7 @@ Quality = Literal["draft", "standard", "fine"]
 Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
+Textures = Literal["network", "plain"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,7 @@ class Settings:
     mesher : how the surface becomes a mesh
     closing : what closes the holes that ball pivoting leaves
     parts : what depths come from: networks, or rules and the outline alone
+    textures : where unseen sides find their colours: where networks tell, or straight behind the drawing
     device : "cpu" or "cuda"
     seed : of everything random
     """
@@ -39,16 +41,18 @@ class Settings:
     mesher: Mesher = "ball-pivot"
     closing: Closing = "pymeshlab"
     parts: Parts = "network"
+    textures: Textures = "network"
     device: str = "cpu"
     seed: int = 0
 
 
-STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "bake", "model")
+STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "textures", "bake", "model")
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
 FIRST_USE = {
     "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
+    "textures": "textures",
 }  # fmt: skip
 """Setting → the first stage that it changes."""
 

@@ -18,6 +18,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, UvMesh
 from fig2mesh.texture.sources import Sources
+from fig2mesh.texture.views import snapped
 
 GRAZING = 0.0
 """Least z of the smooth normal of a point that the viewer may see. The smooth normal decides and not the triangle's, so
@@ -25,6 +26,9 @@ that the border between seen and unseen runs evenly across triangles."""
 
 TURNED = -0.3
 """Triangles turned away further than this are not seen whatever their smooth normal says."""
+
+LEAST_WEIGHT = 0.02
+"""Points that all unseen sides see at a slant, or not at all, have the plain colours."""
 
 LINE_REACH = 0.8
 """How far off the surface corners are looked for, widths of the line."""
@@ -80,6 +84,10 @@ def bake(
         chosen = ~seen & (labels == label)
         picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
         color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
+    if sources.views is not None and sources.palette is not None and len(sources.palette):
+        found, weight = sources.views.at(points[~seen], normal[~seen])
+        known = np.flatnonzero(weight > LEAST_WEIGHT)
+        color[np.flatnonzero(~seen)[known]] = snapped(found[known], sources.palette)
     if body is not None and sources.pen is not None:
         ink = crease_ink(body, points[~seen], normal[~seen], sources.pen.width)[:, None]
         color[~seen] += ink * (sources.pen.colour - color[~seen])

@@ -25,23 +25,29 @@ class Hourglass(nn.Module):
         super().__init__()
         self.stem = nn.Sequential(_Conv(inputs, filters, 2), _Conv(filters, filters))
         self.levels = nn.ModuleList(_Level(filters << (k + 1), filters << k) for k in range(LEVELS - 1))
-        self.last = nn.Sequential(_Conv(filters, filters), nn.Conv2d(filters, 4 * outputs, 1), nn.PixelShuffle(2))
+        self.last = _Conv(filters, filters)
+        self.give = nn.Sequential(nn.Conv2d(filters, 4 * outputs, 1), nn.PixelShuffle(2))
+        # A third faster on processors.
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def forward(self, inputs: Tensor) -> Tensor:
         levels = cast("list[_Level]", list(self.levels))
-        skips = [self.stem(inputs)]
+        skips = [self.stem(inputs.contiguous(memory_format=torch.channels_last))]
         for level in levels:
             skips.append(level.down(skips[-1]))
         hidden = skips.pop()
         for level in reversed(levels):
             hidden = level.up(hidden) + skips.pop()
-        result: Tensor = self.last(hidden)
+        hidden = self.last(hidden)
+        # Half precision is enough for what is looked at, not for what is told.
+        with torch.autocast(inputs.device.type, enabled=False):
+            result: Tensor = self.give(hidden.float())
         return result
 
     @torch.no_grad()
     def start_at_zero(self) -> None:
         """Make the output 0 for any input: for networks that change something by what they give."""
-        final = self.last[1]
+        final = self.give[0]
         assert isinstance(final, nn.Conv2d)
         assert final.bias is not None
         final.weight.zero_()

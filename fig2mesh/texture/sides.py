@@ -25,20 +25,31 @@ class Sides:
     labels : (4, H, W) uint8, body parts (extras as the part that they cover), 0 where nothing is seen
     depth : (4, H, W) float32, VIEW z, FIGURE units, -inf where nothing is seen
     points : (4, H, W, 3) float32, FIGURE; zeros where nothing is seen
-    centre : (2,) FIGURE x, y in the middle of the front picture
-    pitch : FIGURE units of a pixel of the front picture
+    centre : (3,) FIGURE, in the middle of every picture
+    pitch : FIGURE units of a pixel of each side
     """
 
     labels: NDArray[np.uint8]
     depth: NDArray[np.float32]
     points: NDArray[np.float32]
-    centre: tuple[float, float]
-    pitch: float
+    centre: tuple[float, float, float]
+    pitch: tuple[float, float, float, float]
+
+    @property
+    def half(self) -> float:
+        """Half the edge of the front picture, FIGURE units: what 1 is among places."""
+        return float(self.pitch[0] * self.labels.shape[1] / 2)
 
     def places(self) -> NDArray[np.float32]:
         """(4, H, W, 2) x, y of each point in the front picture, edges at -1 and 1, y down."""
-        half = self.pitch * self.labels.shape[1] / 2
-        return np.asarray((self.points[..., :2] - np.array(self.centre)) / half * [1.0, -1.0], np.float32)
+        return np.asarray((self.points[..., :2] - np.array(self.centre[:2])) / self.half * [1.0, -1.0], np.float32)
+
+    def project(self, points: NDArray[np.floating], side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(N, 2) column and row in pixels, centres at +0.5, and (N,) VIEW z of points (N, 3) FIGURE."""
+        turn = axes(list(VIEW_YAW_DEG.values())[side])
+        seen = (np.asarray(points, np.float64) - self.centre) @ turn[:2].T / self.pitch[side]
+        size = self.labels.shape[1]
+        return seen * [1.0, -1.0] + size / 2, np.asarray(points, np.float64) @ turn[2]
 
 
 def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
@@ -63,7 +74,9 @@ def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
         depths.append(np.where(there, place @ turn[2].astype(np.float32), -np.inf).astype(np.float32))
         points.append(place)
         pitches.append(pitch)
-    return Sides(np.stack(labels), np.stack(depths), np.stack(points), (float(centre[0]), float(centre[1])), pitches[0])
+    middle = (float(centre[0]), float(centre[1]), float(centre[2]))
+    front, left, back, right = pitches
+    return Sides(np.stack(labels), np.stack(depths), np.stack(points), middle, (front, left, back, right))
 
 
 def body_labels(labels: NDArray[np.uint8], points: NDArray[np.floating], pose: Pose3D) -> NDArray[np.uint8]:

@@ -20,6 +20,7 @@ from fig2mesh.parts.outline import Outline
 from fig2mesh.records import JOINT, PART, Figure
 from fig2mesh.texture.changes import NO_CHANGES, Changes
 from fig2mesh.texture.pen import Pen, find_pen, reinked
+from fig2mesh.texture.views import ViewTextures
 
 COLOURS = 12
 """Palette size; flat drawings have fewer, shaded ones lose little."""
@@ -57,6 +58,8 @@ class Sources:
     plain : part label → (h, w, 3) float32, the colours that part has on its unseen sides
     plain_scale : IMAGE pixels → pixels of the plain pictures
     changes : how far from straight behind the drawing unseen points find their colours
+    views : pictures of the unseen sides, which go before the plain ones; None for none
+    palette : (K, 3) float32, the drawing's colours without those of strokes
     pen : of the drawing, its width in FIGURE units; None where it has no contours
     """
 
@@ -64,6 +67,8 @@ class Sources:
     plain: dict[int, NDArray[np.float32]]
     plain_scale: float
     changes: Changes = NO_CHANGES
+    views: ViewTextures | None = None
+    palette: NDArray[np.float32] | None = None
     pen: Pen | None = None
 
 
@@ -73,11 +78,11 @@ def make_sources(
     outline: Outline,
     texture_size: int,
     seed: int,
-    ask: Callable[[NDArray[np.float32]], Changes] | None = None,
+    ask: Callable[[NDArray[np.float32]], tuple[Changes, ViewTextures]] | None = None,
 ) -> Sources:
     """The drawing and its plain version for each part of `outline`.
 
-    ask : what tells from the picture with its colours continued where unseen points find theirs
+    ask : what networks tell of the unseen sides, given the picture with its colours continued
     """
     seen = _continued(figure.rgba, figure.mask)
     # A whole factor is the same in both directions, so that one number maps pixels.
@@ -106,8 +111,9 @@ def make_sources(
     if head in plain:
         face, radius = _face(figure, frame, outline, points)
         plain[head] = _without_face(plain[head], labels == head, face, index, palette, ink, 0.5 * radius / pitch)
-    changes = NO_CHANGES if ask is None else ask(seen)
-    return Sources(seen, plain, 1.0 / factor, changes, None if pen is None else replace(pen, width=pen.width * pitch))
+    changes, views = (NO_CHANGES, None) if ask is None else ask(seen)
+    pen = None if pen is None else replace(pen, width=pen.width * pitch)
+    return Sources(seen, plain, 1.0 / factor, changes, views, palette[ink > INK], pen)
 
 
 def _continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -7,6 +7,7 @@ so that all of them are the drawing's own and as sharp.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -14,12 +15,17 @@ import torch
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.field.body import Body
+from fig2mesh.nets.head_hsv import HeadHsv, enhance
 from fig2mesh.nets.texture_fill import TextureFill, fill_inputs, sample
 from fig2mesh.nets.uv_unet import UvUnet, infer_uv
+from fig2mesh.nets.view_refine import ViewRefine, refine
 from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.records import PART, Pose3D
 from fig2mesh.texture.changes import Changes
-from fig2mesh.texture.sides import Sides
+from fig2mesh.texture.sides import Sides, look_around
 from fig2mesh.texture.space import spread
+from fig2mesh.texture.views import ViewTextures, carried_on
 
 INNER_PX: Final = 5.0
 """Pixels this far inside of a side's silhouette count in full."""
@@ -31,24 +37,47 @@ LEAST_PX: Final = 1.5
 def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: Sides) -> NDArray[np.float32]:
     """(H, W, 3) the drawing, colours 0-255, as the front of `sides` frames it."""
     size = sides.labels.shape[1]
-    along = (np.arange(size) + 0.5 - size / 2) * sides.pitch
+    along = (np.arange(size) + 0.5 - size / 2) * sides.pitch[0]
     x, y = np.meshgrid(sides.centre[0] + along, sides.centre[1] - along)
     pixels = frame.image_from_figure(np.stack([x, y], axis=-1))
     # Pixels of the side are larger than the drawing's: average before sampling.
-    blur = 0.4 * max(sides.pitch / frame.units_per_px - 1.0, 0.0)
+    blur = 0.4 * max(sides.pitch[0] / frame.units_per_px - 1.0, 0.0)
     soft = ndimage.gaussian_filter(picture, (blur, blur, 0)) if blur else picture
     where = np.moveaxis(pixels[..., ::-1] - 0.5, -1, 0)
     channels = [ndimage.map_coordinates(soft[..., c], where, order=1, mode="nearest") for c in range(3)]
     return np.stack(channels, axis=-1).astype(np.float32)
 
 
-def unseen_changes(sides: Sides, front: NDArray[np.float32], uv_net: UvUnet, fill_net: TextureFill) -> Changes:
-    """What the networks tell of a body.
+@dataclass(frozen=True)
+class TextureNets:
+    """The networks in the order in which they are asked; the last two may be left out."""
 
-    front : as `front_picture` gives it
+    uv: UvUnet
+    fill: TextureFill
+    refine: ViewRefine | None = None
+    head: HeadHsv | None = None
+
+
+def shipped() -> TextureNets:
+    """The networks that come with the package."""
+    from fig2mesh.nets import head_hsv, texture_fill, uv_unet, view_refine
+
+    return TextureNets(uv_unet.load(), texture_fill.load(), view_refine.load(), head_hsv.load())
+
+
+def texture_coordinates(sides: Sides, net: UvUnet) -> NDArray[np.float32]:
+    """(4, H, W, 2) texture coordinates of the sides."""
+    found = infer_uv(net, torch.from_numpy(sides.depth), torch.from_numpy(sides.labels))
+    return np.asarray(found.movedim(1, 3).numpy())
+
+
+def unseen_changes(
+    sides: Sides, front: NDArray[np.float32], uv: NDArray[np.float32], net: TextureFill
+) -> NDArray[np.float32]:
+    """(4, H, W, 2) how far from straight behind the drawing the sides find their colours, edges at -1 and 1, y down.
+
+    front : as `front_picture` gives it; uv : (4, H, W, 2)
     """
-    with torch.no_grad():
-        uv = infer_uv(uv_net, torch.from_numpy(sides.depth), torch.from_numpy(sides.labels)).movedim(1, 3).numpy()
     seen = sides.labels > 0
     inner = np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
     places = sides.places()
@@ -59,15 +88,54 @@ def unseen_changes(sides: Sides, front: NDArray[np.float32], uv_net: UvUnet, fil
     is_front[0] = True
     values = np.concatenate([places, is_front[..., None], same[..., None]], axis=-1)
     weight = np.clip(inner / INNER_PX, 0.05, 1.0)
-    texels, total = spread(uv[seen], values[seen], weight[seen], fill_net.shape.size)
+    texels, total = spread(uv[seen], values[seen], weight[seen], net.shape.size)
     there = torch.from_numpy(total > 0)[None]
     place = torch.from_numpy(texels[..., :2]).movedim(2, 0)[None]
     colour = sample(torch.from_numpy(np.clip(front / 255, 0, 1)).movedim(2, 0)[None], place)
     flags = torch.from_numpy(texels[..., 2:])[None]
     with torch.no_grad():
-        change = fill_net(fill_inputs(place, there, flags[..., 0] > 0, flags[..., 1] > 0.5, colour))
+        change = net(fill_inputs(place, there, flags[..., 0] > 0, flags[..., 1] > 0.5, colour))
+    at = torch.from_numpy(2 * uv - 1).movedim(3, 1)
+    found = sample(change.expand(len(at), -1, -1, -1), at).movedim(1, 3).numpy()
+    return np.where(seen[..., None], found, np.float32(0))
+
+
+def changes_of(sides: Sides, change: NDArray[np.float32]) -> Changes:
+    """The changes of `unseen_changes` as points of the surface have them."""
+    seen = sides.labels > 0
+    inner = np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
     used = seen & (inner > LEAST_PX)
-    at = torch.from_numpy(uv[used] * 2 - 1).T[None, :, :, None]
-    found = sample(change, at)[0, :, :, 0].T.numpy()
-    half = sides.pitch * size / 2
-    return Changes(sides.points[used], (found * half * [1.0, -1.0]).astype(np.float32))
+    return Changes(sides.points[used], (change[used] * sides.half * [1.0, -1.0]).astype(np.float32))
+
+
+def paint(sides: Sides, front: NDArray[np.float32], nets: TextureNets) -> NDArray[np.float32]:
+    """(4, H, W, 3) pictures of the sides, 0-255; the front is the drawing where that shows it.
+
+    front : as `front_picture` gives it
+    """
+    uv = texture_coordinates(sides, nets.uv)
+    place = torch.from_numpy(sides.places() + unseen_changes(sides, front, uv, nets.fill)).movedim(3, 1)
+    picture = torch.from_numpy(np.clip(front / 255, 0, 1)).movedim(2, 0)[None].expand(4, -1, -1, -1)
+    painted = sample(picture, place)
+    coordinates = torch.from_numpy(uv).movedim(3, 1)
+    labels = torch.from_numpy(sides.labels)
+    if nets.refine is not None:
+        made = refine(nets.refine, painted[1:], coordinates[1:], torch.from_numpy(sides.depth[1:]), labels[1:])
+        if nets.head is not None:
+            heads = enhance(nets.head, painted[1:], coordinates[1:], labels[1:] == PART["head"])
+            made = torch.where((labels[1:] == PART["head"])[:, None], heads, made)
+        painted = torch.cat([painted[:1], made])
+    return np.asarray(255 * painted.movedim(1, 3).numpy(), np.float32)
+
+
+def unseen_sides(
+    body: Body, pose: Pose3D, picture: NDArray[np.float32], frame: ImageFrame, nets: TextureNets
+) -> tuple[Changes, ViewTextures]:
+    """What networks tell of the sides of a body that a drawing does not show.
+
+    picture : (H, W, 3) 0-255, the drawing with its colours continued beyond the silhouette
+    """
+    sides = look_around(body, pose)
+    front = front_picture(picture, frame, sides)
+    change = unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    return changes_of(sides, change), ViewTextures(sides, carried_on(paint(sides, front, nets), sides.labels))

@@ -7,7 +7,7 @@ them. Shapes, labels and depths are the true ones, so that textures alone are me
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,15 +16,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from fig2mesh.nets import texture_fill, uv_unet
-from fig2mesh.nets.texture_fill import TextureFill
-from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, uv_path
+from fig2mesh.nets import uv_unet
+from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
 from fig2mesh.paper import UV_SCORES
 from fig2mesh.records import JOINT, PART, Pose3D
-from fig2mesh.texture.changes import Changes
 from fig2mesh.texture.sides import Sides, body_labels
 from fig2mesh.texture.space import spread
-from fig2mesh.texture.unseen import unseen_changes
+from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
 from fig2mesh.training.build import read_shard, shards
 from fig2mesh.training.evaluate import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.texture_data import Drawings, load_drawings
@@ -36,7 +34,10 @@ Say = Callable[[str], None]
 
 VIEW_NAMES: Final = ("front", "left", "back", "right")
 
-ROADS: Final = ("ours", "straight through the body", "nearest seen point", "OpenCV inpainting in texture space")
+ROADS: Final = (
+    "ours", "ours, coordinates alone", "straight through the body", "nearest seen point",
+    "OpenCV inpainting in texture space",
+)  # fmt: skip
 
 TEXTURE: Final = 256
 """Texels of an edge for inpainting colours."""
@@ -113,35 +114,29 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
         up = (line - y) * pitch / reach
         face = (across**2 + np.where(up > 0, up / FACE_UP, up / FACE_DOWN) ** 2 < 1) & own
     pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * 0.9], joints[:, 2:]], axis=1))
-    sides = Sides(body_labels(labels, points, pose), depth, points, (0.0, 0.0), pitch)
+    tall = [len(np.flatnonzero((side > 0).any(axis=1))) for side in labels]
+    pitches = (pitch, pitch * tall[0] / tall[1], pitch * tall[0] / tall[2], pitch * tall[0] / tall[3])
+    sides = Sides(body_labels(labels, points, pose), depth, points, (0.0, 0.0, 0.0), pitches)
     return Subject(sides, picture[0][tuple(nearest)], picture, face)
 
 
-def paint(subject: Subject, road: str, uv_net: UvUnet, fill_net: TextureFill) -> Picture:
+def painted(subject: Subject, road: str, nets: TextureNets) -> Picture:
     """(4, H, W, 3) the sides as one way to make them has them, from the front picture alone."""
     sides, front = subject.sides, subject.front
     seen = sides.labels > 0
-    place: NDArray[np.floating] = sides.places()
-    if road == "nearest seen point":
+    if road == ROADS[0]:
+        return paint(sides, front, nets)
+    if road == ROADS[1]:
+        return paint(sides, front, replace(nets, refine=None, head=None))
+    if road == ROADS[2]:
+        return _sampled(front, sides.places())
+    if road == ROADS[3]:
         source = sides.points[0][seen[0]]
         _, index = cKDTree(source).query(sides.points[seen])
         result = np.zeros((*seen.shape, 3), np.float32)
         result[seen] = front[seen[0]][index]
         return result
-    if road == "OpenCV inpainting in texture space":
-        return _inpainted(subject, uv_net)
-    if road == "ours":
-        place = place + _in_pictures(unseen_changes(sides, front, uv_net, fill_net), sides)
-    return _sampled(front, place)
-
-
-def _in_pictures(changes: Changes, sides: Sides) -> NDArray[np.float64]:
-    """(4, H, W, 2) changes at the pixels of the sides, edges of the picture at -1 and 1."""
-    seen = sides.labels > 0
-    half = sides.pitch * sides.labels.shape[1] / 2
-    result = np.zeros((*seen.shape, 2))
-    result[seen] = changes.at(sides.points[seen]) / half * [1.0, -1.0]
-    return result
+    return _inpainted(subject, nets)
 
 
 def _sampled(front: Picture, place: NDArray[np.floating]) -> Picture:
@@ -152,15 +147,13 @@ def _sampled(front: Picture, place: NDArray[np.floating]) -> Picture:
     ).astype(np.float32)
 
 
-def _inpainted(subject: Subject, uv_net: UvUnet) -> Picture:
+def _inpainted(subject: Subject, nets: TextureNets) -> Picture:
     """Colours of the front in texture space, the rest of the texture by `cv2.inpaint` after Telea 2004."""
     import cv2
-    import torch
 
     sides = subject.sides
     seen = sides.labels > 0
-    uv = uv_unet.infer_uv(uv_net, torch.from_numpy(sides.depth), torch.from_numpy(sides.labels))
-    coordinates = uv.movedim(1, 3).numpy()
+    coordinates = texture_coordinates(sides, nets.uv)
     known, weight = spread(coordinates[0][seen[0]], subject.front[seen[0]], np.ones(seen[0].sum()), TEXTURE)
     hole = np.where(weight > 0, np.uint8(0), np.uint8(255))
     texture = cv2.inpaint(np.clip(known, 0, 255).astype(np.uint8), hole, 3.0, cv2.INPAINT_TELEA)
@@ -226,7 +219,7 @@ def _uv_table(data: Path, runs: Path | None, bodies: int) -> str:
 
 
 def _side_table(data: Path, bodies: int) -> str:
-    uv_net, fill_net = uv_unet.load(), texture_fill.load()
+    nets = shipped()
     rows, faces = [], []
     for split in SPLITS:
         chosen = subjects(data, split, bodies)
@@ -234,7 +227,7 @@ def _side_table(data: Path, bodies: int) -> str:
             cells = []
             found: dict[str, list[tuple[float, float, float]]] = {"back": [], "sides": []}
             for subject in chosen:
-                made = paint(subject, road, uv_net, fill_net)
+                made = painted(subject, road, nets)
                 for view in (1, 2, 3):
                     mask = subject.sides.labels[view] > 0
                     key = "back" if view == 2 else "sides"
@@ -243,12 +236,13 @@ def _side_table(data: Path, bodies: int) -> str:
                 means = np.mean(values, axis=0)
                 cells += [f"{means[0]:.2f}", f"{means[1]:.3f}", f"{means[2]:.2f}"]
             rows.append((f"{SPLIT_TITLE[split]}: {road}", *cells))
-        for road in ROADS[:2]:
+        for road in ROADS[1:3]:
             shares = []
             for subject in chosen:
-                place = subject.sides.places().astype(np.float64)
-                if road == "ours":
-                    place += _in_pictures(unseen_changes(subject.sides, subject.front, uv_net, fill_net), subject.sides)
+                place = subject.sides.places()
+                if road == ROADS[1]:
+                    uv = texture_coordinates(subject.sides, nets.uv)
+                    place = place + unseen_changes(subject.sides, subject.front, uv, nets.fill)
                 shares.append(face_share(place, subject))
             faces.append((f"{SPLIT_TITLE[split]}: {road}", f"{100 * float(np.nanmean(shares)):.2f}"))
     head = ["way", *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette"))]

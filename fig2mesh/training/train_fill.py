@@ -61,8 +61,12 @@ def train_fill(
     batch: int = BATCH,
     rate: float = RATE,
     device: str = "cpu",
+    amp: bool = True,
 ) -> dict[str, float]:
-    """Scores on the held-out splits; writes all that training leaves."""
+    """Scores on the held-out splits; writes all that training leaves.
+
+    amp : compute in bfloat16, which processors that have it do three times as fast
+    """
     known = unfold(load_drawings(data, ("train",), pictures=True))
     held = {split: unfold(load_drawings(data, (split,), pictures=True, most=24)) for split in HELD_OUT}
     net = seeded(seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
@@ -77,7 +81,7 @@ def train_fill(
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
         model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=100, clip=1.0, device=device, validations=6,
+        seed=seed, batch=batch, warmup=100, clip=1.0, device=device, amp=amp, validations=6,
         arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
     )  # fmt: skip
     found = {f"{split}_{name}": value for split, bodies in held.items()

@@ -199,7 +199,7 @@ def _run(
     optimizer = torch.optim.AdamW(net.parameters(), RATE, weight_decay=1e-4)
     return run_loop(
         model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=100, clip=1.0, validations=5, arguments={"data": recipe_digest(data)},
+        seed=seed, batch=batch, warmup=100, clip=1.0, amp=True, validations=5, arguments={"data": recipe_digest(data)},
     )  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -9,13 +11,23 @@ import torch
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
+from fig2mesh.nets.head_hsv import HeadHsv, HeadShape
 from fig2mesh.nets.texture_fill import FillShape, TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
+from fig2mesh.nets.view_refine import RefineShape, ViewRefine
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import JOINT, JOINT_NAMES, PART, Pose3D
 from fig2mesh.texture.changes import NO_CHANGES, Changes
 from fig2mesh.texture.sides import FILLED, Sides, body_labels, look_around
-from fig2mesh.texture.unseen import front_picture, unseen_changes
+from fig2mesh.texture.unseen import (
+    TextureNets,
+    changes_of,
+    front_picture,
+    paint,
+    texture_coordinates,
+    unseen_changes,
+)
+from fig2mesh.texture.views import ViewTextures, snapped
 from fig2mesh.training.loop import seeded
 
 SIZE = 64
@@ -61,6 +73,15 @@ def test_places_in_front_are_pixels(sides: Sides) -> None:
     np.testing.assert_allclose(sides.places()[2][back][:, 0], -x[back], atol=1e-4)
 
 
+def test_points_are_projected_to_the_pixels_that_show_them(sides: Sides) -> None:
+    for side in range(4):
+        seen = sides.labels[side] > 0
+        pixels, depth = sides.project(sides.points[side][seen], side)
+        rows, columns = np.nonzero(seen)
+        np.testing.assert_allclose(pixels, np.stack([columns, rows], axis=1) + 0.5, atol=1e-3)
+        np.testing.assert_allclose(depth, sides.depth[side][seen], atol=1e-5)
+
+
 def test_extras_count_as_what_they_cover() -> None:
     joints = np.zeros((len(JOINT_NAMES), 3), np.float32)
     for side, x in (("l", 0.1), ("r", -0.1)):
@@ -86,22 +107,71 @@ def test_the_front_picture_is_the_drawing_in_the_frame_of_the_sides(sides: Sides
     np.testing.assert_allclose(found[seen][:, 0], np.clip(x, 0.5, 99.5), atol=0.6)
 
 
+def networks() -> TextureNets:
+    uv = seeded(0, lambda: UvUnet(UvUnetShape(filters=4))).eval()
+    refine, head = ViewRefine(RefineShape(4)), HeadHsv(HeadShape(4, 8))
+    return TextureNets(uv, seeded(0, lambda: TextureFill(FillShape(32, 4))).eval(), refine.eval(), head.eval())
+
+
+def changed(sides: Sides, nets: TextureNets) -> Changes:
+    front = np.zeros((SIZE, SIZE, 3), np.float32)
+    return changes_of(sides, unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill))
+
+
 def test_untrained_networks_change_nothing(sides: Sides) -> None:
-    uv_net = seeded(0, lambda: UvUnet(UvUnetShape(filters=4))).eval()
-    fill_net = seeded(0, lambda: TextureFill(FillShape(32, 4))).eval()
-    found = unseen_changes(sides, np.zeros((SIZE, SIZE, 3), np.float32), uv_net, fill_net)
+    found = changed(sides, networks())
     assert len(found.points) > 1000
     assert not found.change.any()
 
 
 def test_a_change_in_texture_space_moves_points_by_as_much(sides: Sides) -> None:
-    uv_net = seeded(0, lambda: UvUnet(UvUnetShape(filters=4))).eval()
-    fill_net = seeded(0, lambda: TextureFill(FillShape(32, 4))).eval()
+    nets = networks()
     with torch.no_grad():
-        fill_net.net.last[1].bias[:4] = 0.1
-    found = unseen_changes(sides, np.zeros((SIZE, SIZE, 3), np.float32), uv_net, fill_net)
-    step = 0.5 * np.tanh(0.1) * sides.pitch * SIZE / 2
+        nets.fill.net.give[0].bias[:4] = 0.1
+    found = changed(sides, nets)
+    step = 0.5 * np.tanh(0.1) * sides.half
     np.testing.assert_allclose(found.change, np.broadcast_to([step, 0.0], found.change.shape), atol=1e-5)
+
+
+def test_untrained_networks_paint_the_front_straight_through(sides: Sides) -> None:
+    rng = np.random.default_rng(0)
+    front = rng.uniform(0, 255, (SIZE, SIZE, 3)).astype(np.float32)
+    nets = networks()
+    made = paint(sides, front, replace(nets, head=None))
+    seen = sides.labels[0] > 0
+    np.testing.assert_allclose(made[0][seen], front[seen], atol=0.1)
+    back = sides.labels[2] > 0
+    # The box is not quite symmetric to the pixels: compare where both sides see the body.
+    mirrored = front[:, ::-1]
+    assert np.abs(made[2][back] - mirrored[back]).mean() < 1.0
+
+
+def test_points_have_the_colour_of_the_side_that_faces_them(sides: Sides) -> None:
+    flat = np.arange(4, dtype=np.float32)[:, None, None, None] * np.ones((4, SIZE, SIZE, 3), np.float32)
+    views = ViewTextures(sides, flat)
+    for side, yaw in enumerate(VIEW_YAW_DEG.values()):
+        points = sides.points[side][sides.labels[side] > 0]
+        centre = np.array([0.0, 0.0, 0.0])
+        outward = points * [1, 0, 1] - centre
+        outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
+        straight = (outward @ axes(yaw)[2] > 0.97) & (points[:, 1] < 0.3)
+        colour, weight = views.at(points[straight], outward[straight])
+        if side == 0:
+            assert weight.max() < 0.1, "the front is seen by the drawing itself"
+        else:
+            np.testing.assert_allclose(colour[:, 0], side, atol=0.1)
+            assert weight.min() > 0.8
+
+
+def test_points_behind_others_are_not_seen(sides: Sides) -> None:
+    views = ViewTextures(sides, np.ones((4, SIZE, SIZE, 3), np.float32))
+    inside = np.array([[0.0, 0.0, 0.0]])
+    assert views.at(inside, np.array([[0.0, 0.0, -1.0]]))[1][0] == 0
+
+
+def test_colours_are_brought_to_those_of_the_drawing() -> None:
+    palette = np.array([[0.0, 0, 0], [200, 40, 40]])
+    np.testing.assert_array_equal(snapped(np.array([[20.0, 0, 0], [150, 60, 60]]), palette), palette)
 
 
 def test_changes_are_those_of_the_nearest_points() -> None:
