@@ -28,7 +28,7 @@ class Hourglass(nn.Module):
         self.last = _Conv(filters, filters)
         self.give = nn.Sequential(nn.Conv2d(filters, 4 * outputs, 1), nn.PixelShuffle(2))
         # A third faster on processors.
-        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: Tensor) -> Tensor:
         levels = cast("list[_Level]", list(self.levels))
