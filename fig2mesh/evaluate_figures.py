@@ -15,6 +15,7 @@ from typing import Any, Literal
 from exporters.asset import TexturedMesh
 from fig2mesh.errors import InputError
 from fig2mesh.measure import front_similarity, silhouette_iou
+from fig2mesh.measure_bleed import bleed_share
 from fig2mesh.measure_front import flange_share, gap, look, wall_share
 from fig2mesh.measure_solid import laws, quality, thinnest_wall
 from fig2mesh.mesh.simplify import deviation, simplify
@@ -68,6 +69,7 @@ COLUMNS = (
     Column("silhouette_iou", "IoU %", ".1f", 100, "least"),
     Column("front_psnr_db", "PSNR dB", ".1f", 1, "least"),
     Column("front_ssim", "SSIM", ".3f", 1, "least"),
+    Column("bleed_share", "bleed %", ".2f", 100),
     Column("gap_share", "gap %", ".2f", 100),
     Column("gap_radius_mm", "gap mm", ".1f"),
     Column("flange_share", "flange %", ".2f", 100),
@@ -151,6 +153,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
         "silhouette_iou": silhouette_iou(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
         "front_psnr_db": similar.psnr_db,
         "front_ssim": similar.ssim,
+        "bleed_share": bleed_share(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
         "gap_share": missing.share,
         "gap_radius_mm": missing.radius_mm,
         "flange_share": flange_share(front),

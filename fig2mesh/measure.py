@@ -51,7 +51,7 @@ def silhouette_iou(
     """
     if not mask.any():
         return 0.0
-    (x0, y0), (x1, y1) = _box(mask)
+    (x0, y0), (x1, y1) = box_of(mask)
     left, bottom, right, top = (edge / metres_per_pixel for edge in view_bounds(mesh, 0.0))
     model = np.array([[origin_px[0] + left, origin_px[1] - top], [origin_px[0] + right, origin_px[1] - bottom]])
     # A model reaching out further than another figure's size on each side has a wrong scale or place: the rest of it
@@ -60,9 +60,11 @@ def silhouette_iou(
     u0, v0 = np.clip(np.floor(model[0]), (x0 - width, y0 - height), (x0, y0)).astype(int).tolist()
     u1, v1 = np.clip(np.ceil(model[1]), (x1, y1), (x1 + width, y1 + height)).astype(int).tolist()
     step = -(-max(width, height) // MAX_SIDE_PX)
-    drawn = _pixels(mask, (u0, v0, u1, v1), step)
-    origin = _coarse(origin_px, (u0, v0), step)
-    seen = _front(mesh, (drawn.shape[1], drawn.shape[0]), step * metres_per_pixel, origin, 1, "normals")[..., 3] > 0
+    drawn = every_step(mask, (u0, v0, u1, v1), step)
+    origin = coarse_point(origin_px, (u0, v0), step)
+    seen = (
+        front_pixels(mesh, (drawn.shape[1], drawn.shape[0]), step * metres_per_pixel, origin, 1, "normals")[..., 3] > 0
+    )
     # Coarse rows can miss lines of a pixel's width altogether.
     return float((drawn & seen).sum() / max(int((drawn | seen).sum()), 1))
 
@@ -93,18 +95,18 @@ def front_similarity(
 
     if not mask.any():
         return FrontSimilarity(0.0, 0.0)
-    (x0, y0), (x1, y1) = _box(mask)
+    (x0, y0), (x1, y1) = box_of(mask)
     step = -(-max(x1 - x0, y1 - y0) // MAX_SIDE_PX)
     # A border wider than half a window: drawings may touch their picture's edge, and may be smaller than a window.
     border = SSIM_WINDOW * step
     edges = x0 - border, y0 - border, x1 + border, y1 + border
-    mask, rgba = _pixels(mask, edges, step), _pixels(rgba, edges, step)
+    mask, rgba = every_step(mask, edges, step), every_step(rgba, edges, step)
     alpha = rgba[..., 3:].astype(np.float32) / 255 * _soft_figure(mask, rgba[..., 3])[..., None]
     ground = np.array(background, np.float32)
     drawn = np.rint(rgba[..., :3] * alpha + ground * (1 - alpha)).astype(np.uint8)
-    origin = _coarse(origin_px, edges[:2], step)
+    origin = coarse_point(origin_px, edges[:2], step)
     size = mask.shape[1], mask.shape[0]
-    front = _front(mesh, size, step * metres_per_pixel, origin, samples, "textured")
+    front = front_pixels(mesh, size, step * metres_per_pixel, origin, samples, "textured")
     cover = front[..., 3:].astype(np.float32) / 255
     shown = np.rint(front[..., :3] * cover + ground * (1 - cover)).astype(np.uint8)
     both = mask & (front[..., 3] >= 128)
@@ -192,7 +194,7 @@ def _srgb(stored: NDArray[Any]) -> ByteArray:
     return np.asarray(np.rint(255 * curved), dtype=np.uint8)
 
 
-def _front(
+def front_pixels(
     mesh: TexturedMesh,
     size: tuple[int, int],
     metres_per_pixel: float,
@@ -208,13 +210,13 @@ def _front(
     return render_mesh(mesh, yaw_deg=0.0, size=size, mode=mode, bounds=bounds, samples=samples)  # type: ignore[arg-type]
 
 
-def _box(mask: BoolArray) -> tuple[tuple[int, int], tuple[int, int]]:
+def box_of(mask: BoolArray) -> tuple[tuple[int, int], tuple[int, int]]:
     """First and behind-last (x, y) of what is set."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return (int(columns[0]), int(rows[0])), (int(columns[-1]) + 1, int(rows[-1]) + 1)
 
 
-def _pixels(image: NDArray[Any], edges: tuple[int, int, int, int], step: int) -> NDArray[Any]:
+def every_step(image: NDArray[Any], edges: tuple[int, int, int, int], step: int) -> NDArray[Any]:
     """Every step-th pixel between the edges x0, y0, x1, y1, the first one step // 2 inside; zero outside the image."""
     x0, y0, x1, y1 = edges
     first_x, first_y = x0 + step // 2, y0 + step // 2
@@ -226,8 +228,8 @@ def _pixels(image: NDArray[Any], edges: tuple[int, int, int, int], step: int) ->
     return result
 
 
-def _coarse(point_px: tuple[float, float], start: tuple[int, int], step: int) -> tuple[float, float]:
-    """Where a point of the image lies among the pixels of `_pixels`, whose centres are those of the pixels taken."""
+def coarse_point(point_px: tuple[float, float], start: tuple[int, int], step: int) -> tuple[float, float]:
+    """Where a point of the image lies among the pixels of `every_step`, whose centres are those of the pixels taken."""
     shift = step // 2 + 0.5 - step / 2
     return (point_px[0] - start[0] - shift) / step, (point_px[1] - start[1] - shift) / step
 

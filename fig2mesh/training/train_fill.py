@@ -32,7 +32,7 @@ SEEN_WEIGHT: Final = 0.2
 """Texels that the front shows count so much beside those it does not."""
 
 COARSE: Final = 8
-"""Pixels of the blur of a second, coarse picture: its gradient tells of colours further away."""
+"""Pixels of the front that are one in a second, coarse picture: its gradient tells of colours further away."""
 
 SMOOTH: Final = 0.02
 OUTSIDE: Final = 0.1
@@ -113,7 +113,7 @@ def losses(model: torch.nn.Module, texels: Texels) -> dict[str, Tensor]:
     place = texels.place + change
     weight = texels.weight * torch.where(texels.seen, SEEN_WEIGHT, 1.0)
     total = weight.sum().clamp_min(1e-6)
-    blurred = functional.avg_pool2d(texels.front, 2 * COARSE + 1, 1, COARSE, count_include_pad=False)
+    blurred = functional.avg_pool2d(texels.front, COARSE)
     fine, coarse = ((sample(picture, place) - texels.truth).abs().mean(dim=1) for picture in (texels.front, blurred))
     colour = ((fine + coarse) * weight).sum() / total
     known = texels.weight > 0
