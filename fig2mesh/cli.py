@@ -92,8 +92,9 @@ def cli() -> None:
     help="What depths come from: networks, or rules and the outline alone.",
 )  # fmt: skip
 @click.option(
-    "--textures", type=click.Choice(["network", "plain"]), default="network", show_default=True,
-    help="Unseen sides find their colours where networks tell, or straight behind the drawing.",
+    "--textures", type=click.Choice(["network", "plain"]),
+    help="Unseen sides as networks paint them (default), or as the drawing is straight before them (default with "
+    "--parts outline).",
 )  # fmt: skip
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)

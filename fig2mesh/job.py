@@ -50,7 +50,7 @@ def run(
     lods: int,
     visible_from: float,
     parts: str,
-    textures: str,
+    textures: str | None,
     mesher: str,
     closing: str,
     device: str,

@@ -64,6 +64,11 @@ PRESETS: dict[Quality, Settings] = {
 
 
 def settings_for(quality: Quality, **changes: object) -> Settings:
-    """A preset with the given fields replaced; fields that are None keep the preset's value."""
+    """A preset with the given fields replaced; fields that are None keep the preset's value.
+
+    Who wants parts without networks gets textures without them too, unless told otherwise.
+    """
     given = {name: value for name, value in changes.items() if value is not None}
+    if given.get("parts") == "outline":
+        given.setdefault("textures", "plain")
     return replace(PRESETS[quality], **given)  # type: ignore[arg-type]
