@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.camera import axes
-from fig2mesh.records import PART
+from fig2mesh.records import JOINT, JOINT_NAMES, PART
 from fig2mesh.training.texture_data import Drawings
 
 SIZE = 64
@@ -59,4 +59,14 @@ def write_shards(folder: Path, count: int = 12) -> None:
     (folder / "build.json").write_text("{}\n")
     for number, split in enumerate(("train", "valid-clips", "valid-characters")):
         made = drawings(count if split == "train" else 3, number)
-        np.savez(folder / f"{split}-00000.npz", picture=made.picture, labels=made.labels, depth=made.depth, uv=made.uv)
+        np.savez(
+            folder / f"{split}-00000.npz", picture=made.picture, labels=made.labels, depth=made.depth, uv=made.uv,
+            joints=np.stack([joints() for _ in range(len(made))]),
+        )  # fmt: skip
+
+
+def joints() -> NDArray[np.float32]:
+    """(21, 3) a pelvis, a head and a face that looks forward."""
+    result = np.zeros((len(JOINT_NAMES), 3), np.float32)
+    result[JOINT["head"]], result[JOINT["eyes"]] = (0.2, 0.4, 0.0), (0.2, 0.45, 0.1)
+    return result
