@@ -192,8 +192,6 @@ def _build(asset: Asset, lod: int) -> _Document:
 
 
 def _material(document: _Document, mesh: TexturedMesh) -> int:
-    # Unlit: a drawing brings its own light and shade. The fields beside it are what viewers without unlit show.
-    document.used.add("KHR_materials_unlit")
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
     if mesh.texture is not None:
         document.json["samplers"] = [
@@ -207,10 +205,13 @@ def _material(document: _Document, mesh: TexturedMesh) -> int:
         document.json["images"] = [{"name": "texture"}]  # where its bytes are differs between .glb and .gltf
         document.json["textures"] = [{"sampler": 0, "source": 0}]
         surface["baseColorTexture"] = {"index": 0}
-    return document.add(
-        "materials",
-        {"name": "drawing", "pbrMetallicRoughness": surface, "extensions": {"KHR_materials_unlit": {}}},
-    )
+    material: dict[str, Any] = {"name": "drawing", "pbrMetallicRoughness": surface}
+    if mesh.texture is not None or mesh.colors is not None:
+        # Unlit: a drawing brings its own light and shade. The fields beside it are what viewers without unlit show.
+        # A figure without colours would be a white silhouette.
+        document.used.add("KHR_materials_unlit")
+        material["extensions"] = {"KHR_materials_unlit": {}}
+    return document.add("materials", material)
 
 
 def _linear_rgba(colors: NDArray[np.uint8]) -> NDArray[np.uint16]:

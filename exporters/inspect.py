@@ -30,7 +30,8 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
     path : any kind that `exporters.validate.validate` takes
     returns : format, files (name → bytes), name, copyright, generator, vertices, triangles, bounds_m [low, high] in
         the frame of the file, size_m, watertight, solid, components, genus, volume_m3, texture_px [width, height],
-        parts, placement (lon_deg, lat_deg, height_m, heading_deg and what else is recorded), lods, metadata
+        parts, observed (part → share that the drawing showed), placement (lon_deg, lat_deg, height_m, heading_deg and
+        what else is recorded), lods, metadata
 
     Raises ExportError for what cannot be read.
     """
@@ -46,8 +47,9 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
         reason = " ".join(str(error).split())[:120]
         raise ExportError(path, f"damaged ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
     keys = ("format", "files", "name", "copyright", "generator", "vertices", "triangles", "bounds_m", "size_m")
-    more = ("watertight", "solid", "components", "genus", "volume_m3", "texture_px", "parts", "placement", "lods")
-    return {key: found.get(key) for key in (*keys, *more, "metadata")}
+    more = ("watertight", "solid", "components", "genus", "volume_m3", "texture_px", "parts", "observed")
+    last = ("placement", "lods", "metadata")
+    return {key: found.get(key) for key in (*keys, *more, *last)}
 
 
 def _inspect_any(path: Path) -> dict[str, Any]:
@@ -120,6 +122,7 @@ def _gltf_facts(gltf: Gltf) -> dict[str, Any]:
         **_solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
         "texture_px": _texture_size(gltf.image(0)) if gltf.items("images") else None,
         "parts": _part_names(gltf, tables[0]) if tables else None,
+        "observed": _observed(gltf, tables[0]) if tables else None,
         "placement": extras.get("georeference"),
         "metadata": extras.get("metadata"),
     }
@@ -129,6 +132,15 @@ def _part_names(gltf: Gltf, table: dict[str, Any]) -> list[str]:
     column = table["properties"]["name"]
     text, offsets = gltf.view(column["values"]), np.frombuffer(gltf.view(column["stringOffsets"]), "<u4")
     return [text[begin:end].decode() for begin, end in itertools.pairwise(offsets.tolist())]
+
+
+def _observed(gltf: Gltf, table: dict[str, Any]) -> dict[str, float] | None:
+    """Share of each part that the drawing itself showed; None in files without."""
+    column = table["properties"].get("observedShare")
+    if column is None:
+        return None
+    shares = np.frombuffer(gltf.view(column["values"]), "<f4")
+    return {name: round(float(share), 3) for name, share in zip(_part_names(gltf, table), shares, strict=True)}
 
 
 def _inspect_tileset(path: Path) -> dict[str, Any]:

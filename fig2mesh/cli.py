@@ -92,15 +92,19 @@ def cli() -> None:
     help="What depths come from: networks, or rules and the outline alone.",
 )  # fmt: skip
 @click.option(
-    "--textures", type=click.Choice(["network", "plain"]),
-    help="Unseen sides as networks paint them (default), or as the drawing is straight before them (default with "
-    "--parts outline).",
+    "--textures", type=click.Choice(["network", "plain", "none"]),
+    help="Unseen sides as networks paint them (default), or in the plain colours of what is drawn before them (default "
+    "with --parts outline); or no texture at all.",
 )  # fmt: skip
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
 @click.option("--credit", default="", metavar="TEXT", help="Attribution, kept in the outputs.")
+@click.option(
+    "--evidence/--no-evidence", default=True, show_default=True,
+    help="Part names and how much of each the drawing showed, as glTF feature ids.",
+)  # fmt: skip
 @click.option("--save-stages", type=FILE, metavar="DIR", help="Keep what each stage made.")
 @click.option("--resume-from", metavar="STAGE", help="Start at STAGE with what --save-stages DIR holds.")
 @click.option("--report", type=FILE, metavar="JSON", help="Seconds, memory, measures, versions, hashes.")

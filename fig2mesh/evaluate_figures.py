@@ -141,7 +141,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     model, solid = levels[0], results["solid"].mesh
 
     frame = image_frame(figure)
-    asset = asset_from_figure(results["lift"], results["unwrap"][0].solid.vertices, FIGURE_HEIGHT)
+    asset = asset_from_figure(results["lift"], results["simplify"][0].vertices, FIGURE_HEIGHT)
     pixel, origin_px = on_drawing(frame, asset)
     similar = front_similarity(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     missing = gap(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)

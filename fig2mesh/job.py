@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,9 @@ log = logging.getLogger("fig2mesh")
 
 REQUEST = "request"
 """Name of the stage file that says what the others were made for."""
+
+COLOURING = ("unwrap", "textures", "bake")
+"""Stages that figures without texture do not need."""
 
 
 def run(
@@ -56,6 +59,7 @@ def run(
     device: str,
     seed: int,
     credit: str,
+    evidence: bool,
     save_stages: Path | None,
     resume_from: str | None,
     report: Path | None,
@@ -100,11 +104,14 @@ def run(
         found = results["solid"].how
         if found.components != pieces:
             log.warning("%s: %d solids for %d drawn pieces; %s", figure, found.components, pieces, found.note)
+        levels = results["model"]
+        if not evidence:
+            levels = tuple(replace(level, parts=None, observed=None) for level in levels)
         asset = Asset(
             name=drawn.name,
-            lods=results["model"],
+            lods=levels,
             placement=placement,
-            part_names=_part_names(results["model"]),
+            part_names=_part_names(levels) if evidence else {},
             copyright=credit,
             metadata={"source": figure.name, "seed": settings.seed, "quality": quality},
         )
@@ -138,6 +145,8 @@ def _run_steps(
     first = 0 if resume_from is None else next(i for i, step in enumerate(road) if step.name == resume_from)
     if "cloud" not in (step.name for step in road):
         timings.append(Timing("cloud", 0.0, _peak_mb(), skipped="the isosurface needs no points"))
+    if settings.textures == "none":
+        timings += [Timing(name, 0.0, _peak_mb(), skipped="no texture is asked for") for name in COLOURING]
     for index, step in enumerate(road):
         advance(step.name)
         start = time.perf_counter()
@@ -168,6 +177,8 @@ def _stages(folder: Path, figure: Figure, settings: Settings, resume_from: str |
     before = load_stage(folder, REQUEST)
     if resume_from == "cloud" and settings.mesher == "isosurface":
         raise InputError("--resume-from", "cloud is not run with --mesher isosurface", "choose another stage")
+    if resume_from in COLOURING and settings.textures == "none":
+        raise InputError("--resume-from", f"{resume_from} is not run with --textures none", "choose another stage")
     if before.get("figure") != request["figure"]:
         raise InputError("--resume-from", "the stages were made from another figure", "pass that figure, or run anew")
     start = STAGES.index(resume_from)

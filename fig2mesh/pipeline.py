@@ -7,7 +7,7 @@ a caller can time them, keep what they make and start in the middle.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -113,21 +113,35 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
     def finish(
         pose: Pose3D, body: Body, solid: Solid, unwrapped: tuple[UvMesh, ...], baked: tuple[Baked, ...]
     ) -> tuple[TexturedMesh, ...]:
-        asset = asset_from_figure(pose, unwrapped[0].solid.vertices, height_m)
+        levels = finish_bare(pose, body, solid, tuple(mesh.solid for mesh in unwrapped))
+        return tuple(
+            replace(
+                level,
+                vertices=level.vertices[mesh.solid_index],
+                faces=mesh.faces,
+                normals=level.normals[mesh.solid_index],
+                solid_index=mesh.solid_index,
+                uv=mesh.uv,
+                texture=Texture(texture.color),
+                observed=Texture(texture.observed[..., None]),
+                parts=None if level.parts is None else level.parts[mesh.solid_index],
+            )
+            for level, mesh, texture in zip(levels, unwrapped, baked, strict=True)
+        )
+
+    def finish_bare(pose: Pose3D, body: Body, solid: Solid, meshes: tuple[Mesh, ...]) -> tuple[TexturedMesh, ...]:
+        asset = asset_from_figure(pose, meshes[0].vertices, height_m)
         scale = float(asset.matrix[0, 0])
         levels = []
-        for mesh, texture in zip(unwrapped, baked, strict=True):
-            mean, worst = deviation(mesh.solid, solid.mesh)
+        for mesh in meshes:
+            mean, worst = deviation(mesh, solid.mesh)
             levels.append(
                 TexturedMesh(
-                    vertices=asset.apply(mesh.solid.vertices).astype(np.float32)[mesh.solid_index],
+                    vertices=asset.apply(mesh.vertices).astype(np.float32),
                     faces=mesh.faces,
-                    normals=vertex_normals(mesh.solid, body)[mesh.solid_index],
-                    solid_index=mesh.solid_index,
-                    uv=mesh.uv,
-                    texture=Texture(texture.color),
-                    observed=Texture(texture.observed[..., None]),
-                    parts=_labels(body, mesh.solid.vertices)[mesh.solid_index],
+                    normals=vertex_normals(mesh, body),
+                    solid_index=np.arange(len(mesh.vertices), dtype=np.int32),
+                    parts=_labels(body, mesh.vertices),
                     deviation_m=(mean * scale, worst * scale),
                 )
             )
@@ -138,16 +152,23 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         if settings.mesher == "ball-pivot"
         else (Step("solid", ("body", "pieces"), mesh_field),)
     )
+    colouring = (
+        (Step("model", ("lift", "body", "solid", "simplify"), finish_bare, kept=False),)
+        if settings.textures == "none"
+        else (
+            Step("unwrap", ("simplify",), unwrap_levels),
+            Step("textures", ("figure", "lift", "parts", "body"), find_colours, kept=False),
+            Step("bake", ("figure", "textures", "body", "unwrap"), bake_levels),
+            Step("model", ("lift", "body", "solid", "unwrap", "bake"), finish, kept=False),
+        )
+    )
     return (
         Step("lift", ("figure",), lift_pose),
         Step("parts", ("figure", "lift"), infer_parts),
         Step("body", ("parts",), assemble, kept=False),
         *meshing,
         Step("simplify", ("solid",), simplify_levels),
-        Step("unwrap", ("simplify",), unwrap_levels),
-        Step("textures", ("figure", "lift", "parts", "body"), find_colours, kept=False),
-        Step("bake", ("figure", "textures", "body", "unwrap"), bake_levels),
-        Step("model", ("lift", "body", "solid", "unwrap", "bake"), finish, kept=False),
+        *colouring,
     )
 
 

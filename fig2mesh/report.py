@@ -51,11 +51,15 @@ def make_report(
     """
     figure = results["figure"]
     frame = image_frame(figure)
-    transform = asset_from_figure(results["lift"], results["unwrap"][0].solid.vertices, height_m)
+    transform = asset_from_figure(results["lift"], results["simplify"][0].vertices, height_m)
     pixel, origin_px = on_drawing(frame, transform)
     front = front_similarity(asset.mesh, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     iou = silhouette_iou(asset.mesh, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    baked = results["bake"][0]
+    observed = {}
+    if "bake" in results:
+        baked = results["bake"][0]
+        share = float((baked.observed[baked.covered] > 0).sum()) / max(int(baked.covered.sum()), 1)
+        observed = {"front_psnr_db": front.psnr_db, "front_ssim": front.ssim, "texels_observed": share}
     return {
         "fig2mesh": __version__,
         "figure": {"file": inputs[0].name, "pieces": results["pieces"]},
@@ -67,9 +71,7 @@ def make_report(
             **shape_measures(asset.mesh),
             "pieces_drawn": results["pieces"],
             "silhouette_iou": iou,
-            "front_psnr_db": front.psnr_db,
-            "front_ssim": front.ssim,
-            "texels_observed": float((baked.observed[baked.covered] > 0).sum()) / max(int(baked.covered.sum()), 1),
+            **observed,
         },
         "lods": [
             {"triangles": len(m.faces), "mean_deviation_m": m.deviation_m[0], "max_deviation_m": m.deviation_m[1]}

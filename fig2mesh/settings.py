@@ -9,7 +9,7 @@ Quality = Literal["draft", "standard", "fine"]
 Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
-Textures = Literal["network", "plain"]
+Textures = Literal["network", "plain", "none"]
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Settings:
     mesher : how the surface becomes a mesh
     closing : what closes the holes that ball pivoting leaves
     parts : what depths come from: networks, or rules and the outline alone
-    textures : where unseen sides find their colours: where networks tell, or straight behind the drawing
+    textures : of unseen sides: as networks paint them, or plain colours of what is drawn before them; none at all
     device : "cpu" or "cuda"
     seed : of everything random
     """
@@ -52,7 +52,7 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "text
 FIRST_USE = {
     "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
-    "textures": "textures",
+    "textures": "unwrap",
 }  # fmt: skip
 """Setting → the first stage that it changes."""
 

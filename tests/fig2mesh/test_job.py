@@ -86,6 +86,41 @@ def test_credit_and_place_are_kept(finished: Run) -> None:
     assert "Drawn by a test" in json.dumps(inspect(finished.output("a.glb")))
 
 
+def test_evidence_is_shown_and_can_be_left_out(finished: Run, tmp_path: Path) -> None:
+    shown = inspect(finished.output("a.glb"))
+    assert set(shown["observed"]) == set(shown["parts"])
+    assert all(0 <= share <= 1 for share in shown["observed"].values())
+    assert 0.3 < shown["observed"]["torso"] < 0.7, "the front of it"
+    target = tmp_path / "a.glb"
+    arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "-q", "-o", str(target)]
+    assert main([*arguments, "--quality", "draft", "--parts", "outline", "--no-evidence"]) == 0
+    plain = inspect(target)
+    assert plain["parts"] is None
+    assert plain["observed"] is None
+
+
+def test_without_textures_no_texture_network_runs(
+    finished: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse() -> None:
+        raise AssertionError("a texture network was asked for")
+
+    monkeypatch.setattr("fig2mesh.texture.unseen.shipped", refuse)
+    arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--quality", "draft", "-q"]
+    for name, textures in (("plain", "plain"), ("none", "none")):
+        report = tmp_path / f"{name}.json"
+        made = ["--textures", textures, "-o", str(tmp_path / f"{name}.glb"), "--report", str(report)]
+        assert main([*arguments, *made]) == 0
+        assert validate(tmp_path / f"{name}.glb") == []
+    stages = {stage["stage"]: stage for stage in json.loads(report.read_text())["stages"]}
+    for stage in ("unwrap", "textures", "bake"):
+        assert not stages[stage]["run"]
+        assert stages[stage]["why"] == "no texture is asked for"
+    facts = inspect(tmp_path / "none.glb")
+    assert facts["texture_px"] is None
+    assert facts["solid"]
+
+
 def digest(folder: Path) -> dict[str, str]:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
