@@ -15,6 +15,9 @@ RIM_PX = 2.0
 BEYOND_PX = 3
 """Background and figure are what is this far outside and inside of the drawn contour: between them they mix."""
 
+OPAQUE = 64
+"""Alpha from which the colour of a pixel of a cut-out figure, which has nothing of the background, is known."""
+
 NEAR_PX = 8
 """Colours of the figure are looked for within this many pixels: contours are thin, and fills begin beside them."""
 
@@ -48,10 +51,15 @@ def bleed_share(
     covered = front[..., 3] > 0
     rim = covered & (ndimage.distance_transform_edt(covered) <= RIM_PX)
     outer = known & (ndimage.distance_transform_edt(~inside) >= BEYOND_PX)
-    inner = ndimage.distance_transform_edt(inside) > BEYOND_PX
-    inner = inner if inner.any() else inside
     if not rim.any() or not outer.any():
         return 0.0
+    alpha = every_step(rgba, edges, step)[..., 3]
+    if alpha[outer].mean() < 128:
+        # A cut-out knows its own rim: what is opaque is figure.
+        inner = inside & (alpha >= OPAQUE)
+    else:
+        inner = ndimage.distance_transform_edt(inside) > BEYOND_PX
+    inner = inner if inner.any() else inside
     colour = front[rim][:, :3].astype(np.float32)
     ground = picture[_nearest(outer, rim)]
     own = _least_distance(colour, picture, inner, rim)

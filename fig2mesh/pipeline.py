@@ -14,12 +14,12 @@ import numpy as np
 
 from exporters.asset import Texture, TexturedMesh
 from fig2mesh.field.body import Body
-from fig2mesh.mesh.bake import Baked, bake
+from fig2mesh.mesh.bake import Baked, bake, drawn_faces
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.mesh.scan import scan
 from fig2mesh.mesh.simplify import deviation, simplify
 from fig2mesh.mesh.solid import Solid, make_solid
-from fig2mesh.mesh.unwrap import unwrap
+from fig2mesh.mesh.unwrap import Drawn, unwrap
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.network import part_inference
@@ -81,8 +81,14 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
     def simplify_levels(solid: Solid) -> tuple[Mesh, ...]:
         return tuple(simplify(solid.mesh, max(settings.triangles // 4**level, 200)) for level in range(settings.lods))
 
-    def unwrap_levels(levels: tuple[Mesh, ...]) -> tuple[UvMesh, ...]:
-        return tuple(unwrap(mesh, texture_size=_texels(settings, level)) for level, mesh in enumerate(levels))
+    def unwrap_levels(figure: Figure, levels: tuple[Mesh, ...]) -> tuple[UvMesh, ...]:
+        frame = image_frame(figure)
+        unwrapped = []
+        for level, mesh in enumerate(levels):
+            pixels = frame.image_from_figure(mesh.vertices[:, :2].astype(np.float64))
+            drawn = Drawn(drawn_faces(mesh), pixels)
+            unwrapped.append(unwrap(mesh, texture_size=_texels(settings, level), drawn=drawn))
+        return tuple(unwrapped)
 
     def find_colours(figure: Figure, pose: Pose3D, outline: Outline, body: Body) -> Sources:
         frame = image_frame(figure)
@@ -156,7 +162,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         (Step("model", ("lift", "body", "solid", "simplify"), finish_bare, kept=False),)
         if settings.textures == "none"
         else (
-            Step("unwrap", ("simplify",), unwrap_levels),
+            Step("unwrap", ("figure", "simplify"), unwrap_levels),
             Step("textures", ("figure", "lift", "parts", "body"), find_colours, kept=False),
             Step("bake", ("figure", "textures", "body", "unwrap"), bake_levels),
             Step("model", ("lift", "body", "solid", "unwrap", "bake"), finish, kept=False),

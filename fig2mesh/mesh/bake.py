@@ -16,13 +16,14 @@ from scipy import ndimage
 
 from fig2mesh.field.body import Body
 from fig2mesh.parse.frame import ImageFrame
-from fig2mesh.records import ByteArray, FloatArray, UvMesh
+from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
 from fig2mesh.texture.views import snapped
 
-GRAZING = 0.0
+GRAZING = -0.1
 """Least z of the smooth normal of a point that the viewer may see. The smooth normal decides and not the triangle's, so
-that the border between seen and unseen runs evenly across triangles."""
+that the border between seen and unseen runs evenly across triangles. Below 0, for the rim of a mesh is not that of the
+smooth surface, and a pen's contour there may be no wider than a pixel."""
 
 TURNED = -0.3
 """Triangles turned away further than this are not seen whatever their smooth normal says."""
@@ -74,7 +75,7 @@ def bake(
     corners = mesh.solid.vertices[mesh.solid.faces].astype(np.float64)
     points = np.einsum("nk,nkd->nd", weights[covered], corners[face])
     normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
-    seen = _seen(mesh, face, points, normal)
+    seen = _seen(mesh.solid, face, points, normal)
     pixels = frame.image_from_figure(points)
     color = np.empty((len(face), 3))
     color[seen] = _bilinear(sources.seen, pixels[seen])
@@ -100,13 +101,31 @@ def bake(
     return Baked(image[tuple(source)], observed[tuple(source)], covered)
 
 
+def drawn_faces(mesh: Mesh) -> NDArray[np.bool_]:
+    """(F,) bool: triangles that face the viewer and that nothing hides at their corners, middle and between."""
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    a, b, c = (corners[:, i] for i in range(3))
+    flat = np.cross(b - a, c - a)
+    seen = flat[:, 2] > 0
+    for weights in _LOOKS:
+        rows = np.flatnonzero(seen)
+        seen[rows] = _seen(mesh, rows, np.einsum("k,nkd->nd", weights, corners[rows]), flat[rows])
+    return seen
+
+
+_LOOKS = np.array([
+    [1, 1, 1], [0.9, 0.05, 0.05], [0.05, 0.9, 0.05], [0.05, 0.05, 0.9], [1, 1, 0], [0, 1, 1], [1, 0, 1],
+]) / np.array([3, 1, 1, 1, 2, 2, 2])[:, None]  # fmt: skip
+"""Barycentric coordinates at which triangles are looked at."""
+
+
 def _seen(
-    mesh: UvMesh, face: NDArray[np.int32], points: NDArray[np.float64], smooth: NDArray[np.float64]
+    mesh: Mesh, face: NDArray[np.integer], points: NDArray[np.float64], smooth: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """(N,) bool: points (with their smooth normals) that the viewer of the drawing, far away along +z, sees."""
     import open3d as o3d
 
-    vertices, faces = mesh.solid.vertices, mesh.solid.faces
+    vertices, faces = mesh.vertices, mesh.faces
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
     flat = np.cross(b - a, c - a)
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)

@@ -8,12 +8,13 @@ brings no more charts, rather fewer. Turned charts are off because xatlas mirror
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.mesh.topology import face_areas
-from fig2mesh.records import Mesh, UvMesh
+from fig2mesh.records import BoolArray, Mesh, UvMesh
 
 MAX_COST = 1.0
 """Cost at which a chart stops growing."""
@@ -25,7 +26,29 @@ ESTIMATE = 0.78
 """xatlas takes the size of a texture as a wish and exceeds it by a quarter; asked for this share it about fits."""
 
 
-def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4) -> UvMesh:
+FILL = 0.62
+"""Share of a texture that charts of figures fill."""
+
+DRAWN_SHARE = 0.6
+"""Largest share of that for what the drawing shows."""
+
+LEAST_DENSITY = 0.45
+"""Least density of the rest, texels a unit of length, relative to what the drawing shows."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What the drawing shows of a mesh.
+
+    faces : (F,) bool, triangles that it shows whole
+    pixels : (V, 2) float64, where the vertices are in it, pixels, y down
+    """
+
+    faces: BoolArray
+    pixels: NDArray[np.float64]
+
+
+def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4, drawn: Drawn | None = None) -> UvMesh:
     """Texture coordinates for a closed, oriented mesh.
 
     Parameters
@@ -33,17 +56,23 @@ def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4) -> UvMesh:
     mesh : FIGURE (any unit will do)
     texture_size : texels along each side of the square texture
     padding : least distance between charts, texels; less only where tens of charts are to fit into a tiny texture
+    drawn : what the drawing shows lies in the texture as in the drawing, pixel on texel where the texture is large
+        enough, and the rest at no more texels for a unit of length; None: nothing is drawn
 
     Returns
     -------
-    A `UvMesh` whose charts have the same number of texels for a unit of length in both directions and everywhere, do
-    not overlap, and are nowhere mirrored: no triangle has a negative area in (u, v). Charts smaller than a texel are
-    enlarged to one.
+    A `UvMesh` whose charts have the same number of texels for a unit of length in both directions and, but for what is
+    drawn, everywhere, do not overlap, and are nowhere mirrored: the picture shows the surface as it looks from outside.
+    Charts smaller than a texel are enlarged to one.
     """
     if texture_size < 16 or padding < 0:
         raise ValueError(f"texture_size {texture_size}, padding {padding}: expected at least 16 and 0 texels")
     if len(mesh.faces) == 0:
         raise ValueError("mesh: has no faces to unwrap")
+    if drawn is not None and drawn.faces.any():
+        found = _with_drawing(mesh, drawn, texture_size, padding)
+        if found is not None:
+            return found
     wish = ESTIMATE * texture_size
     for _ in range(3):
         source, faces, texels, size = _pack(mesh, max(int(wish), 8), padding + 1)
@@ -52,8 +81,112 @@ def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4) -> UvMesh:
             break
         # Padding takes a larger share of small textures than the estimate knows.
         wish *= scale
-    uv = np.clip(texels / max(size), 0.0, 1.0).astype(np.float32)
+    uv = np.clip(_upright(texels, max(size)) / max(size), 0.0, 1.0).astype(np.float32)
     return UvMesh(mesh, faces.astype(np.int32), source.astype(np.int32), uv, (texture_size, texture_size))
+
+
+def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> UvMesh | None:
+    """Charts as the drawing has them, and charts of the rest, packed together; None where they do not fit."""
+    front = _part(mesh, drawn.faces)
+    indices, local = front
+    pixels = drawn.pixels[indices]
+    rest = _part(mesh, ~drawn.faces)
+    # One drawn pixel on one texel, or on a half or fewer where the texture is small.
+    area = float(_signed_areas(pixels, local).sum())
+    usable = FILL * texture_size**2
+    scale = min(1.0, math.sqrt(DRAWN_SHARE * usable / max(area, 1e-9)))
+    units = math.sqrt(area / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
+    layout = None
+    if len(rest[1]):
+        piece = Mesh(mesh.vertices[rest[0]], rest[1].astype(np.int32))
+        source, faces, texels, _ = _pack(piece, texture_size, padding + 1)
+        layout = source, faces, _upright(texels, texels[:, 1].max())
+        lengths = math.sqrt(float(_signed_areas(texels, faces).sum()) / max(float(face_areas(piece).sum()), 1e-12))
+        wanted = math.sqrt(
+            max(usable - area * scale**2, 0.1 * usable) / max(float(_signed_areas(texels, faces).sum()), 1e-9)
+        )
+        factor = min(wanted, units / lengths)
+    for _ in range(12):
+        charts = [(pixels * scale, local)]
+        if layout is not None:
+            charts.append((layout[2] * factor, layout[1]))
+        placed = _place(charts, texture_size, padding + 1)
+        if placed is not None:
+            break
+        if layout is not None and factor * lengths > LEAST_DENSITY * units:
+            factor *= 0.92
+        else:
+            scale *= 0.92
+            units *= 0.92
+    else:
+        return None
+    sources, all_faces, positions, count = [], np.empty((len(mesh.faces), 3), np.int64), [], 0
+    own = [indices] if layout is None else [indices, rest[0][layout[0]]]
+    for chosen, vertex, (position, faces) in zip((drawn.faces, ~drawn.faces), own, placed, strict=False):
+        all_faces[chosen] = faces + count
+        sources.append(vertex)
+        positions.append(position)
+        count += len(vertex)
+    uv = np.clip(np.concatenate(positions) / texture_size, 0.0, 1.0).astype(np.float32)
+    sourced = np.concatenate(sources).astype(np.int32)
+    return UvMesh(mesh, all_faces.astype(np.int32), sourced, uv, (texture_size, texture_size))
+
+
+def _upright(texels: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+    """xatlas has v upwards, pictures have rows downwards."""
+    return np.stack([texels[:, 0], height - texels[:, 1]], axis=1)
+
+
+def _part(mesh: Mesh, chosen: BoolArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices of some faces, and the faces among them."""
+    indices, local = np.unique(mesh.faces[chosen], return_inverse=True)
+    return indices.astype(np.int64), local.reshape(-1, 3).astype(np.int64)
+
+
+def _signed_areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    first, second = b - a, c - a
+    return np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+
+
+def _place(
+    charts: list[tuple[NDArray[np.float64], NDArray[np.int64]]], resolution: int, padding: int
+) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]] | None:
+    """Layouts (positions in texels, faces) with their charts moved to where they fit; None where they do not.
+
+    Charts move by whole texels and are not scaled: xatlas widens them to whole texels, so its places alone are taken.
+    """
+    import xatlas
+
+    atlas = xatlas.Atlas()
+    for positions, faces in charts:
+        atlas.add_uv_mesh(positions.astype(np.float32), faces.astype(np.uint32))
+    packing = xatlas.PackOptions()
+    packing.rotate_charts = packing.rotate_charts_to_axis = False
+    packing.texels_per_unit = 1.0
+    packing.resolution = resolution
+    packing.padding = padding
+    packing.bilinear = True
+    atlas.generate(xatlas.ChartOptions(), packing)
+    if atlas.atlas_count != 1 or max(atlas.width, atlas.height) > resolution:
+        return None
+    size = np.array([atlas.width, atlas.height], np.float64)
+    result = []
+    for number, (positions, faces) in enumerate(charts):
+        vertex, _, uv = atlas[number]
+        # Charts are numbered through all layouts.
+        _, chart = np.unique(np.asarray(atlas.get_mesh_vertex_assignment(number)[1]), return_inverse=True)
+        found, before = uv.astype(np.float64) * size, positions[vertex]
+        low = np.full((chart.max() + 1, 2), np.inf)
+        start = low.copy()
+        np.minimum.at(low, chart, found)
+        np.minimum.at(start, chart, before)
+        moved = before + np.round(low - start)[chart]
+        # xatlas splits vertices between charts only, so faces keep their corners.
+        by_source = np.empty((len(positions), 2))
+        by_source[vertex] = moved
+        result.append((by_source, faces))
+    return result
 
 
 def _pack(

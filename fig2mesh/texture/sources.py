@@ -22,6 +22,15 @@ from fig2mesh.texture.changes import NO_CHANGES, Changes
 from fig2mesh.texture.pen import Pen, find_pen, reinked
 from fig2mesh.texture.views import ViewTextures
 
+CUT_OUT = 64
+"""Mean alpha beside a figure below which it was cut out of its picture."""
+
+UNLIKE = 16.0
+"""How much more that must be, RGB 0-255."""
+
+LEAST_ALPHA = 64
+"""Alpha above which a pixel's colour is known well enough."""
+
 COLOURS = 12
 """Palette size; flat drawings have fewer, shaded ones lose little."""
 
@@ -84,7 +93,7 @@ def make_sources(
 
     ask : what networks tell of the unseen sides, given the picture with its colours continued
     """
-    seen = _continued(figure.rgba, figure.mask)
+    seen = continued(figure.rgba, figure.mask)
     # A whole factor is the same in both directions, so that one number maps pixels.
     factor = max(1, int(max(figure.mask.shape) / (PLAIN_SHARE * texture_size)))
     small = np.asarray(Image.fromarray(seen.astype(np.uint8)).reduce(factor), dtype=np.float32)
@@ -116,13 +125,36 @@ def make_sources(
     return Sources(seen, plain, 1.0 / factor, changes, views, palette[ink > INK], pen)
 
 
-def _continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """The picture with its inner colours carried outwards, so that no background is mixed in at the rim."""
-    solid = ndimage.binary_erosion(mask, iterations=1, border_value=1) & (rgba[..., 3] > 250)
+def continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """The picture with its inner colours carried outwards, so that no background is mixed in at the rim.
+
+    Of scans the outermost pixel is mixed with paper, unless it is a contour no wider than that. Cut-out figures have
+    their own colour up to the rim.
+    """
+    alpha = rgba[..., 3]
+    if not mask.all() and alpha[~mask].mean() < CUT_OUT:
+        solid = mask & (alpha >= LEAST_ALPHA)
+    else:
+        solid = ndimage.binary_erosion(mask, border_value=1) & (alpha > 250)
+        solid |= mask & _unlike_paper(rgba, mask, solid)
     if not solid.any():
         solid = mask
     _, source = ndimage.distance_transform_edt(~solid, return_indices=True)
     return np.asarray(rgba[..., :3][tuple(source)], np.float32)
+
+
+def _unlike_paper(rgba: NDArray[np.uint8], mask: NDArray[np.bool_], solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H, W) bool: pixels that differ more from the paper beside them than the figure further in does."""
+    paper = ~ndimage.binary_dilation(mask, iterations=2)
+    if not paper.any() or not solid.any():
+        return np.zeros_like(mask)
+    picture = rgba[..., :3].astype(np.float32)
+    ground, inner = (
+        picture[tuple(ndimage.distance_transform_edt(~there, return_distances=False, return_indices=True))]
+        for there in (paper, solid)
+    )
+    own, within = (np.linalg.norm(colour - ground, axis=-1) for colour in (picture, inner))
+    return np.asarray(own > within + UNLIKE)
 
 
 def _lookup(image: NDArray[np.uint8], where: NDArray[np.int_]) -> NDArray[np.uint8]:

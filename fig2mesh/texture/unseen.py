@@ -30,6 +30,9 @@ from fig2mesh.texture.views import ViewTextures, carried_on
 INNER_PX: Final = 5.0
 """Pixels this far inside of a side's silhouette count in full."""
 
+SMOOTH_PX: Final = 2.5
+"""Spread of the average over changes, pixels."""
+
 LEAST_PX: Final = 1.5
 """Pixels nearer to the silhouette are seen at too much of a slant to tell anything."""
 
@@ -97,7 +100,18 @@ def unseen_changes(
         change = net(fill_inputs(place, there, flags[..., 0] > 0, flags[..., 1] > 0.5, colour))
     at = torch.from_numpy(2 * uv - 1).movedim(3, 1)
     found = sample(change.expand(len(at), -1, -1, -1), at).movedim(1, 3).numpy()
-    return np.where(seen[..., None], found, np.float32(0))
+    return _smoothed(np.where(seen[..., None], found, np.float32(0)), seen)
+
+
+def _smoothed(change: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Changes (4, H, W, 2) averaged over some pixels of the body: texture coordinates err from pixel to pixel."""
+    result = np.zeros_like(change)
+    for side in range(len(change)):
+        share = ndimage.gaussian_filter(seen[side].astype(np.float32), SMOOTH_PX)
+        for axis in range(2):
+            blurred = ndimage.gaussian_filter(change[side, ..., axis], SMOOTH_PX)
+            result[side, ..., axis] = np.where(seen[side], blurred / np.maximum(share, 1e-6), 0.0)
+    return result
 
 
 def changes_of(sides: Sides, change: NDArray[np.float32]) -> Changes:

@@ -58,3 +58,12 @@ def test_where_figure_and_paper_are_alike_nothing_can_be_told() -> None:
 def test_an_empty_mask_has_none() -> None:
     rgba, mask = scan()
     assert share(textured(RED, 0), rgba, np.zeros_like(mask)) == 0
+
+
+def test_contours_of_cut_out_figures_are_no_background() -> None:
+    """Pictures with transparency are mostly black where they show nothing, as thin contours are."""
+    rgba, mask = scan(rim=INK, width=0.02)
+    rgba[~mask] = 0
+    assert share(textured(INK, 0.02), rgba, mask) == 0
+    rgba[mask] = (*RED, 255)
+    assert share(textured(INK, 0.02), rgba, mask) > 0.3

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import ImageDraw
+from scipy import ndimage
 
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import outline_parts
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import JOINT, JOINT_NAMES, PART, Figure
-from fig2mesh.texture.sources import Sources, make_sources
+from fig2mesh.texture.sources import Sources, continued, make_sources
 from tests.drawn import JOINTS, draw_figure
 
 SCALE = 2
@@ -97,3 +98,36 @@ def make_sources_seen(figure: Figure) -> np.ndarray:
 def test_deterministic(figure: Figure, sources: Sources) -> None:
     again = colours_of(figure)
     assert all(np.array_equal(sources.plain[part], again.plain[part]) for part in sources.plain)
+
+
+PAPER, RED = (240, 235, 225), (200, 40, 40)
+
+
+def on_paper(rim: tuple[int, int, int], fill: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """An opaque scan of a disc whose outermost pixel has a colour of its own."""
+    y, x = np.mgrid[:80, :80] + 0.5
+    away = np.hypot(x - 40, y - 40)
+    mask = away < 30
+    colour = np.where((away > 29)[..., None], rim, fill)
+    colour = np.where(mask[..., None], colour, PAPER)
+    return np.dstack([colour, np.full(mask.shape, 255)]).astype(np.uint8), mask
+
+
+def test_a_contour_of_one_pixel_is_no_paper() -> None:
+    rgba, mask = on_paper(INK, PAPER)
+    seen = continued(rgba, mask)
+    assert near(seen[10, 40], INK)
+    assert near(seen[2, 40], INK), "carried on beyond the silhouette"
+
+
+def test_a_rim_mixed_with_paper_is_left_out() -> None:
+    rgba, mask = on_paper(RED, RED)
+    rim = mask & ~ndimage.binary_erosion(mask)
+    rgba[rim, :3] = (rgba[rim, :3] // 2) + np.array(PAPER, np.uint8) // 2
+    assert near(continued(rgba, mask), RED, 5).all()
+
+
+def test_cut_out_figures_keep_their_rim() -> None:
+    rgba, mask = on_paper(INK, RED)
+    rgba[~mask] = 0
+    assert near(continued(rgba, mask)[2, 40], INK)
