@@ -246,7 +246,7 @@ def _features(
     }
     shares = observed_shares(mesh)
     if shares is not None:
-        description = "Share of the part's texels that the drawing itself shows; the rest is inferred"
+        description = "Share of the part's surface that the drawing itself shows; the rest is inferred"
         properties["observedShare"] = {
             "type": "SCALAR", "componentType": "FLOAT32", "required": True, "description": description,
         }  # fmt: skip

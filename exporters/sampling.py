@@ -58,7 +58,7 @@ _SPLIT = 4
 
 
 def observed_shares(mesh: TexturedMesh) -> dict[int, float] | None:
-    """Share of each part's texels that the drawing itself showed, label → [0, 1]; None without that knowledge."""
+    """Share of each part's surface that the drawing itself showed, label → [0, 1]; None without that knowledge."""
     if mesh.parts is None or mesh.observed is None or mesh.uv is None:
         return None
     centres = []
@@ -72,8 +72,9 @@ def observed_shares(mesh: TexturedMesh) -> dict[int, float] | None:
     corners = mesh.uv[mesh.faces].astype(np.float64)
     points = np.einsum("kc,fcx->fkx", weights, corners)
     seen = sample(mesh.observed, points.reshape(-1, 2))[:, 0].reshape(len(corners), -1).mean(axis=1) / 255.0
-    edges = corners[:, 1:] - corners[:, :1]
-    area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    # By area in space: what is drawn has more texels than the rest.
+    placed = mesh.vertices[mesh.faces].astype(np.float64)
+    area = np.linalg.norm(np.cross(placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]), axis=1)
     parts = face_parts(mesh)
     total = np.bincount(parts, weights=area, minlength=256)
     visible = np.bincount(parts, weights=area * seen, minlength=256)

@@ -29,9 +29,8 @@ from fig2mesh.pose.network import lift_by_network
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh, PointCloud, Pose3D, UvMesh
 from fig2mesh.settings import Settings
-from fig2mesh.texture.changes import Changes
 from fig2mesh.texture.sources import Sources, make_sources
-from fig2mesh.texture.views import ViewTextures
+from fig2mesh.texture.votes import Unseen
 
 LEAST_TEXELS = 128
 
@@ -93,7 +92,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
     def find_colours(figure: Figure, pose: Pose3D, outline: Outline, body: Body) -> Sources:
         frame = image_frame(figure)
 
-        def ask(picture: FloatArray) -> tuple[Changes, ViewTextures]:
+        def ask(picture: FloatArray) -> Unseen:
             from fig2mesh.texture.unseen import shipped, unseen_sides
 
             return unseen_sides(body, pose, picture, frame, shipped())

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from exporters.asset import Asset
+from exporters.sampling import observed_shares
 from fig2mesh import __version__
 from fig2mesh.doctor import PACKAGES, version
 from fig2mesh.measure import front_similarity, shape_measures, silhouette_iou
 from fig2mesh.parse.frame import image_frame
 from fig2mesh.placing import asset_from_figure, on_drawing
+from fig2mesh.records import PART_NAMES
 from fig2mesh.settings import Settings
 
 
@@ -55,11 +57,10 @@ def make_report(
     pixel, origin_px = on_drawing(frame, transform)
     front = front_similarity(asset.mesh, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     iou = silhouette_iou(asset.mesh, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    observed = {}
-    if "bake" in results:
-        baked = results["bake"][0]
-        share = float((baked.observed[baked.covered] > 0).sum()) / max(int(baked.covered.sum()), 1)
-        observed = {"front_psnr_db": front.psnr_db, "front_ssim": front.ssim, "texels_observed": share}
+    shares = observed_shares(results["model"][0])
+    observed: dict[str, Any] = {}
+    if shares is not None:
+        observed = {"front_psnr_db": front.psnr_db, "front_ssim": front.ssim, "observed": _by_name(shares)}
     return {
         "fig2mesh": __version__,
         "figure": {"file": inputs[0].name, "pieces": results["pieces"]},
@@ -82,6 +83,10 @@ def make_report(
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
     }
+
+
+def _by_name(shares: dict[int, float]) -> dict[str, float]:
+    return {PART_NAMES[label]: share for label, share in shares.items()}
 
 
 def _sha256(path: Path) -> str:

@@ -1,7 +1,7 @@
 """Colours for the texture atlas (paper appendix C).
 
 Every texel is a point of the surface. Where the drawing sees that point, it takes the drawing's own pixel; elsewhere
-it takes the plain colours of its part from where `Changes` tells, and where the drawing has contours, creases between
+it takes the plain colours of its part, and where the drawing has contours, creases between
 limbs have the drawing's ink. Seeing is decided on the mesh itself: a ray from the point towards the viewer
 must leave freely, so that an arm in front of the chest does not smear onto it.
 """
@@ -18,7 +18,6 @@ from fig2mesh.field.body import Body
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
-from fig2mesh.texture.views import snapped
 
 GRAZING = 0.0
 """Least z of the smooth normal of a point that the viewer may see. The smooth normal decides and not the triangle's, so
@@ -27,9 +26,6 @@ drawn out along the side: at -0.1 fronts come nearer to the drawing by 0.3 dB or
 
 TURNED = -0.3
 """Triangles turned away further than this are not seen whatever their smooth normal says."""
-
-LEAST_WEIGHT = 0.02
-"""Points that all unseen sides see at a slant, or not at all, have the plain colours."""
 
 LINE_REACH = 0.8
 """How far off the surface corners are looked for, widths of the line."""
@@ -79,16 +75,11 @@ def bake(
     pixels = frame.image_from_figure(points)
     color = np.empty((len(face), 3))
     color[seen] = _bilinear(sources.seen, pixels[seen])
-    pixels[~seen] = frame.image_from_figure(points[~seen][:, :2] + sources.changes.at(points[~seen]))
     labels = face_parts[face]
     for label in np.unique(labels[~seen]):
         chosen = ~seen & (labels == label)
         picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
         color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
-    if sources.views is not None and sources.palette is not None and len(sources.palette):
-        found, weight = sources.views.at(points[~seen], normal[~seen])
-        known = np.flatnonzero(weight > LEAST_WEIGHT)
-        color[np.flatnonzero(~seen)[known]] = snapped(found[known], sources.palette)
     if body is not None and sources.pen is not None:
         ink = crease_ink(body, points[~seen], normal[~seen], sources.pen.width)[:, None]
         color[~seen] += ink * (sources.pen.colour - color[~seen])

@@ -23,40 +23,35 @@ class Sides:
     """What is seen from each side.
 
     labels : (4, H, W) uint8, body parts (extras as the part that they cover), 0 where nothing is seen
+    shown : (4, H, W) uint8, parts as they are, extras too
     depth : (4, H, W) float32, VIEW z, FIGURE units, -inf where nothing is seen
     points : (4, H, W, 3) float32, FIGURE; zeros where nothing is seen
-    centre : (3,) FIGURE, in the middle of every picture
-    pitch : FIGURE units of a pixel of each side
+    centre : (2,) FIGURE x, y in the middle of the front picture
+    pitch : FIGURE units of a pixel of the front picture
     """
 
     labels: NDArray[np.uint8]
+    shown: NDArray[np.uint8]
     depth: NDArray[np.float32]
     points: NDArray[np.float32]
-    centre: tuple[float, float, float]
-    pitch: tuple[float, float, float, float]
+    centre: tuple[float, float]
+    pitch: float
 
     @property
     def half(self) -> float:
         """Half the edge of the front picture, FIGURE units: what 1 is among places."""
-        return float(self.pitch[0] * self.labels.shape[1] / 2)
+        return float(self.pitch * self.labels.shape[1] / 2)
 
     def places(self) -> NDArray[np.float32]:
         """(4, H, W, 2) x, y of each point in the front picture, edges at -1 and 1, y down."""
-        return np.asarray((self.points[..., :2] - np.array(self.centre[:2])) / self.half * [1.0, -1.0], np.float32)
-
-    def project(self, points: NDArray[np.floating], side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(N, 2) column and row in pixels, centres at +0.5, and (N,) VIEW z of points (N, 3) FIGURE."""
-        turn = axes(list(VIEW_YAW_DEG.values())[side])
-        seen = (np.asarray(points, np.float64) - self.centre) @ turn[:2].T / self.pitch[side]
-        size = self.labels.shape[1]
-        return seen * [1.0, -1.0] + size / 2, np.asarray(points, np.float64) @ turn[2]
+        return np.asarray((self.points[..., :2] - np.array(self.centre)) / self.half * [1.0, -1.0], np.float32)
 
 
 def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
     """The four sides of a body, each as large as fits."""
     bounds = body.bounds().astype(np.float64)
     centre = bounds.mean(axis=0)
-    labels, depths, points, pitches = [], [], [], []
+    labels, shown, depths, points, pitches = [], [], [], [], []
     for yaw in VIEW_YAW_DEG.values():
         turn = axes(yaw)
         extent = np.abs(turn) @ (bounds[1] - bounds[0])
@@ -71,12 +66,12 @@ def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
         place = np.where(there[..., None], hits.points.reshape(size, size, 3), np.float32(0))
         part = np.where(there, body.labels[np.maximum(seen, 0)], np.uint8(0))
         labels.append(body_labels(part, place, pose))
+        shown.append(part)
         depths.append(np.where(there, place @ turn[2].astype(np.float32), -np.inf).astype(np.float32))
         points.append(place)
         pitches.append(pitch)
-    middle = (float(centre[0]), float(centre[1]), float(centre[2]))
-    front, left, back, right = pitches
-    return Sides(np.stack(labels), np.stack(depths), np.stack(points), middle, (front, left, back, right))
+    middle = (float(centre[0]), float(centre[1]))
+    return Sides(np.stack(labels), np.stack(shown), np.stack(depths), np.stack(points), middle, pitches[0])
 
 
 def body_labels(labels: NDArray[np.uint8], points: NDArray[np.floating], pose: Pose3D) -> NDArray[np.uint8]:

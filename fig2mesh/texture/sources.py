@@ -18,9 +18,8 @@ from scipy.cluster.vq import kmeans2
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import JOINT, PART, Figure
-from fig2mesh.texture.changes import NO_CHANGES, Changes
 from fig2mesh.texture.pen import Pen, find_pen, reinked
-from fig2mesh.texture.views import ViewTextures
+from fig2mesh.texture.votes import Unseen, voted
 
 CUT_OUT = 64
 """Mean alpha beside a figure below which it was cut out of its picture."""
@@ -66,18 +65,12 @@ class Sources:
     seen : (H, W, 3) float32 sRGB 0-255; the drawing, its colours continued beyond the silhouette
     plain : part label → (h, w, 3) float32, the colours that part has on its unseen sides
     plain_scale : IMAGE pixels → pixels of the plain pictures
-    changes : how far from straight behind the drawing unseen points find their colours
-    views : pictures of the unseen sides, which go before the plain ones; None for none
-    palette : (K, 3) float32, the drawing's colours without those of strokes
     pen : of the drawing, its width in FIGURE units; None where it has no contours
     """
 
     seen: NDArray[np.float32]
     plain: dict[int, NDArray[np.float32]]
     plain_scale: float
-    changes: Changes = NO_CHANGES
-    views: ViewTextures | None = None
-    palette: NDArray[np.float32] | None = None
     pen: Pen | None = None
 
 
@@ -87,7 +80,7 @@ def make_sources(
     outline: Outline,
     texture_size: int,
     seed: int,
-    ask: Callable[[NDArray[np.float32]], tuple[Changes, ViewTextures]] | None = None,
+    ask: Callable[[NDArray[np.float32]], Unseen] | None = None,
 ) -> Sources:
     """The drawing and its plain version for each part of `outline`.
 
@@ -106,6 +99,8 @@ def make_sources(
     ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)
     pen = find_pen(palette, index, ink, labels > 0)
 
+    unseen = None if ask is None else ask(seen)
+    face, radius = _face(figure, frame, outline, points)
     plain: dict[int, NDArray[np.float32]] = {}
     for surface in outline.layers:
         parts = [int(part) for part in np.unique(surface.labels[surface.labels > 0])]
@@ -113,16 +108,21 @@ def make_sources(
         if not own.any():
             own = labels > 0
         kind = _dominant(index, own, ink, len(palette), WINDOW / pitch)
-        picture = reinked(palette, kind, own, pen)
         for part in parts:
-            plain[part] = picture
-    head = PART["head"]
-    if head in plain:
-        face, radius = _face(figure, frame, outline, points)
-        plain[head] = _without_face(plain[head], labels == head, face, index, palette, ink, 0.5 * radius / pitch)
-    changes, views = (NO_CHANGES, None) if ask is None else ask(seen)
+            areas, group = kind, parts
+            if part == PART["head"]:
+                areas = _without_face(kind, labels == part, face, index, ink, 0.5 * radius / pitch)
+                group = [part]
+            if unseen is not None:
+                chosen = np.isin(unseen.labels, group)
+                pixels, named = (
+                    np.floor(frame.image_from_figure(places[chosen].astype(np.float64))[:, ::-1] / factor).astype(int)
+                    for places in (unseen.points, unseen.found)
+                )
+                areas = voted(areas, pixels, named)
+            plain[part] = reinked(palette, areas, own, pen)
     pen = None if pen is None else replace(pen, width=pen.width * pitch)
-    return Sources(seen, plain, 1.0 / factor, changes, views, palette[ink > INK], pen)
+    return Sources(seen, plain, 1.0 / factor, pen)
 
 
 def continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -230,25 +230,23 @@ def _dominant(
 
 
 def _without_face(
-    picture: NDArray[np.float32],
+    kind: NDArray[np.int_],
     head: NDArray[np.bool_],
     face: NDArray[np.bool_],
     index: NDArray[np.int_],
-    palette: NDArray[np.float32],
     weight: NDArray[np.float64],
     radius: float,
-) -> NDArray[np.float32]:
-    """The plain head with the face replaced by what surrounds it (hair, hat), as long as that is not skin."""
+) -> NDArray[np.int_]:
+    """The areas of the head with the face replaced by what surrounds it (hair, hat), as long as that is not skin."""
     face = face & head
     around = head & ~face
     if not face.any() or not around.any():
-        return picture
-    skin = int(np.argmax(np.bincount(index[face], minlength=len(palette)) * weight))
+        return kind
+    skin = int(np.argmax(np.bincount(index[face], minlength=len(weight)) * weight))
     hair = around & (index != skin) & (weight[index] > INK)
     if hair.sum() < LEAST_HAIR * head.sum():
         hair = around
-    behind = np.where(face[..., None], palette[_dominant(index, hair, weight, len(palette), radius)], picture)
-    return np.asarray(ndimage.gaussian_filter(behind, (1.5, 1.5, 0)))
+    return np.where(face, _dominant(index, hair, weight, len(weight), radius), kind)
 
 
 def _face(

@@ -1,8 +1,8 @@
 """Where in the drawing the sides that it does not show take their colours from (paper §4.3 and §4.4).
 
 Four sides of the body are traced, their texture coordinates inferred, and in texture space a network tells for every
-texel how far from the place straight behind the drawing its colour is found. Colours themselves are not made up here,
-so that all of them are the drawing's own and as sharp.
+texel how far from the place straight behind the drawing its colour is found. Two more add details to the sides painted
+so, one of them to heads.
 """
 
 from __future__ import annotations
@@ -22,10 +22,9 @@ from fig2mesh.nets.uv_unet import UvUnet, infer_uv
 from fig2mesh.nets.view_refine import ViewRefine, refine
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import PART, Pose3D
-from fig2mesh.texture.changes import Changes
 from fig2mesh.texture.sides import Sides, look_around
 from fig2mesh.texture.space import spread
-from fig2mesh.texture.views import ViewTextures, carried_on
+from fig2mesh.texture.votes import Unseen
 
 INNER_PX: Final = 5.0
 """Pixels this far inside of a side's silhouette count in full."""
@@ -40,11 +39,11 @@ LEAST_PX: Final = 1.5
 def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: Sides) -> NDArray[np.float32]:
     """(H, W, 3) the drawing, colours 0-255, as the front of `sides` frames it."""
     size = sides.labels.shape[1]
-    along = (np.arange(size) + 0.5 - size / 2) * sides.pitch[0]
+    along = (np.arange(size) + 0.5 - size / 2) * sides.pitch
     x, y = np.meshgrid(sides.centre[0] + along, sides.centre[1] - along)
     pixels = frame.image_from_figure(np.stack([x, y], axis=-1))
     # Pixels of the side are larger than the drawing's: average before sampling.
-    blur = 0.4 * max(sides.pitch[0] / frame.units_per_px - 1.0, 0.0)
+    blur = 0.4 * max(sides.pitch / frame.units_per_px - 1.0, 0.0)
     soft = ndimage.gaussian_filter(picture, (blur, blur, 0)) if blur else picture
     where = np.moveaxis(pixels[..., ::-1] - 0.5, -1, 0)
     channels = [ndimage.map_coordinates(soft[..., c], where, order=1, mode="nearest") for c in range(3)]
@@ -53,7 +52,7 @@ def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: Sides)
 
 @dataclass(frozen=True)
 class TextureNets:
-    """The networks in the order in which they are asked; the last two may be left out."""
+    """The networks in the order in which they are asked; the main job does without the last two."""
 
     uv: UvUnet
     fill: TextureFill
@@ -63,9 +62,9 @@ class TextureNets:
 
 def shipped() -> TextureNets:
     """The networks that come with the package."""
-    from fig2mesh.nets import head_hsv, texture_fill, uv_unet, view_refine
+    from fig2mesh.nets import texture_fill, uv_unet
 
-    return TextureNets(uv_unet.load(), texture_fill.load(), view_refine.load(), head_hsv.load())
+    return TextureNets(uv_unet.load(), texture_fill.load())
 
 
 def texture_coordinates(sides: Sides, net: UvUnet) -> NDArray[np.float32]:
@@ -114,14 +113,6 @@ def _smoothed(change: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[n
     return result
 
 
-def changes_of(sides: Sides, change: NDArray[np.float32]) -> Changes:
-    """The changes of `unseen_changes` as points of the surface have them."""
-    seen = sides.labels > 0
-    inner = np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
-    used = seen & (inner > LEAST_PX)
-    return Changes(sides.points[used], (change[used] * sides.half * [1.0, -1.0]).astype(np.float32))
-
-
 def paint(sides: Sides, front: NDArray[np.float32], nets: TextureNets) -> NDArray[np.float32]:
     """(4, H, W, 3) pictures of the sides, 0-255; the front is the drawing where that shows it.
 
@@ -144,12 +135,18 @@ def paint(sides: Sides, front: NDArray[np.float32], nets: TextureNets) -> NDArra
 
 def unseen_sides(
     body: Body, pose: Pose3D, picture: NDArray[np.float32], frame: ImageFrame, nets: TextureNets
-) -> tuple[Changes, ViewTextures]:
-    """What networks tell of the sides of a body that a drawing does not show.
+) -> Unseen:
+    """The left, back and right of a body, and where networks look for their colours.
 
     picture : (H, W, 3) 0-255, the drawing with its colours continued beyond the silhouette
     """
     sides = look_around(body, pose)
     front = front_picture(picture, frame, sides)
     change = unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
-    return changes_of(sides, change), ViewTextures(sides, carried_on(paint(sides, front, nets), sides.labels))
+    seen = sides.labels > 0
+    inner = np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
+    used = inner > LEAST_PX
+    used[0] = False
+    points = sides.points[used][:, :2]
+    found = points + change[used] * np.array([sides.half, -sides.half], np.float32)
+    return Unseen(sides.shown[used], points, found.astype(np.float32))

@@ -17,7 +17,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from fig2mesh.nets import uv_unet
+from fig2mesh.nets.head_hsv import head_path, read_head
 from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
+from fig2mesh.nets.view_refine import read_refine, refine_path
 from fig2mesh.paper import UV_SCORES
 from fig2mesh.records import JOINT, PART, Pose3D
 from fig2mesh.texture.sides import Sides, body_labels
@@ -35,8 +37,8 @@ Say = Callable[[str], None]
 VIEW_NAMES: Final = ("front", "left", "back", "right")
 
 ROADS: Final = (
-    "ours", "ours, coordinates alone", "straight through the body", "nearest seen point",
-    "OpenCV inpainting in texture space",
+    "coordinates, refined, heads", "coordinates, refined", "coordinates",
+    "straight through the body", "nearest seen point", "OpenCV inpainting in texture space",
 )  # fmt: skip
 
 TEXTURE: Final = 256
@@ -114,9 +116,7 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
         up = (line - y) * pitch / reach
         face = (across**2 + np.where(up > 0, up / FACE_UP, up / FACE_DOWN) ** 2 < 1) & own
     pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * 0.9], joints[:, 2:]], axis=1))
-    tall = [len(np.flatnonzero((side > 0).any(axis=1))) for side in labels]
-    pitches = (pitch, pitch * tall[0] / tall[1], pitch * tall[0] / tall[2], pitch * tall[0] / tall[3])
-    sides = Sides(body_labels(labels, points, pose), depth, points, (0.0, 0.0, 0.0), pitches)
+    sides = Sides(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
     return Subject(sides, picture[0][tuple(nearest)], picture, face)
 
 
@@ -124,13 +124,12 @@ def painted(subject: Subject, road: str, nets: TextureNets) -> Picture:
     """(4, H, W, 3) the sides as one way to make them has them, from the front picture alone."""
     sides, front = subject.sides, subject.front
     seen = sides.labels > 0
-    if road == ROADS[0]:
-        return paint(sides, front, nets)
-    if road == ROADS[1]:
-        return paint(sides, front, replace(nets, refine=None, head=None))
-    if road == ROADS[2]:
-        return _sampled(front, sides.places())
+    if road in ROADS[:3]:
+        given = (nets, replace(nets, head=None), replace(nets, refine=None, head=None))[ROADS.index(road)]
+        return paint(sides, front, given)
     if road == ROADS[3]:
+        return _sampled(front, sides.places())
+    if road == ROADS[4]:
         source = sides.points[0][seen[0]]
         _, index = cKDTree(source).query(sides.points[seen])
         result = np.zeros((*seen.shape, 3), np.float32)
@@ -191,11 +190,11 @@ def face_share(made_place: NDArray[np.floating], subject: Subject) -> float:
 
 
 def evaluate_textures(data: Path, runs: Path | None, bodies: int, say: Say = lambda line: None) -> str:
-    """The report as Markdown; runs : folder that holds the network without masks, which is not shipped."""
+    """The report as Markdown; runs : folder of networks that are not shipped: without masks, and those that refine."""
     say("Table 4: texture coordinates")
     sections = ["## Table 4: texture coordinates", _uv_table(data, runs, bodies)]
     say("Unseen sides")
-    sections += ["## Unseen sides", _side_table(data, bodies)]
+    sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs))]
     return "\n\n".join(sections) + "\n"
 
 
@@ -218,12 +217,26 @@ def _uv_table(data: Path, runs: Path | None, bodies: int) -> str:
     return f"{text}\n\n{table(head, rows)}"
 
 
-def _side_table(data: Path, bodies: int) -> str:
+def _networks(runs: Path | None) -> TextureNets:
+    """The shipped networks, and those that refine what they paint where they have been trained."""
     nets = shipped()
+    refining, heads = (
+        sorted(runs.rglob(path(Path()).name)) if runs is not None else [] for path in (refine_path, head_path)
+    )
+    return replace(
+        nets,
+        refine=read_refine(refining[0])[0] if refining else None,
+        head=read_head(heads[0])[0] if heads else None,
+    )
+
+
+def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
+    missing = {ROADS[0]: nets.head is None or nets.refine is None, ROADS[1]: nets.refine is None}
+    roads = [road for road in ROADS if not missing.get(road)]
     rows, faces = [], []
     for split in SPLITS:
         chosen = subjects(data, split, bodies)
-        for road in ROADS:
+        for road in roads:
             cells = []
             found: dict[str, list[tuple[float, float, float]]] = {"back": [], "sides": []}
             for subject in chosen:
@@ -236,11 +249,11 @@ def _side_table(data: Path, bodies: int) -> str:
                 means = np.mean(values, axis=0)
                 cells += [f"{means[0]:.2f}", f"{means[1]:.3f}", f"{means[2]:.2f}"]
             rows.append((f"{SPLIT_TITLE[split]}: {road}", *cells))
-        for road in ROADS[1:3]:
+        for road in ROADS[2:4]:
             shares = []
             for subject in chosen:
                 place = subject.sides.places()
-                if road == ROADS[1]:
+                if road == ROADS[2]:
                     uv = texture_coordinates(subject.sides, nets.uv)
                     place = place + unseen_changes(subject.sides, subject.front, uv, nets.fill)
                 shares.append(face_share(place, subject))

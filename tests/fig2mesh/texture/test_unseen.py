@@ -17,17 +17,15 @@ from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import JOINT, JOINT_NAMES, PART, Pose3D
-from fig2mesh.texture.changes import NO_CHANGES, Changes
 from fig2mesh.texture.sides import FILLED, Sides, body_labels, look_around
 from fig2mesh.texture.unseen import (
     TextureNets,
-    changes_of,
     front_picture,
     paint,
     texture_coordinates,
     unseen_changes,
+    unseen_sides,
 )
-from fig2mesh.texture.views import ViewTextures, snapped
 from fig2mesh.training.loop import seeded
 
 SIZE = 64
@@ -73,15 +71,6 @@ def test_places_in_front_are_pixels(sides: Sides) -> None:
     np.testing.assert_allclose(sides.places()[2][back][:, 0], -x[back], atol=1e-4)
 
 
-def test_points_are_projected_to_the_pixels_that_show_them(sides: Sides) -> None:
-    for side in range(4):
-        seen = sides.labels[side] > 0
-        pixels, depth = sides.project(sides.points[side][seen], side)
-        rows, columns = np.nonzero(seen)
-        np.testing.assert_allclose(pixels, np.stack([columns, rows], axis=1) + 0.5, atol=1e-3)
-        np.testing.assert_allclose(depth, sides.depth[side][seen], atol=1e-5)
-
-
 def test_extras_count_as_what_they_cover() -> None:
     joints = np.zeros((len(JOINT_NAMES), 3), np.float32)
     for side, x in (("l", 0.1), ("r", -0.1)):
@@ -113,24 +102,23 @@ def networks() -> TextureNets:
     return TextureNets(uv, seeded(0, lambda: TextureFill(FillShape(32, 4))).eval(), refine.eval(), head.eval())
 
 
-def changed(sides: Sides, nets: TextureNets) -> Changes:
+def changed(sides: Sides, nets: TextureNets) -> np.ndarray:
     front = np.zeros((SIZE, SIZE, 3), np.float32)
-    return changes_of(sides, unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill))
+    return unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
 
 
 def test_untrained_networks_change_nothing(sides: Sides) -> None:
-    found = changed(sides, networks())
-    assert len(found.points) > 1000
-    assert not found.change.any()
+    assert not changed(sides, networks()).any()
 
 
-def test_a_change_in_texture_space_moves_points_by_as_much(sides: Sides) -> None:
+def test_a_change_in_texture_space_moves_every_place_by_as_much(sides: Sides) -> None:
     nets = networks()
     with torch.no_grad():
         nets.fill.net.give[0].bias[:4] = 0.1
     found = changed(sides, nets)
-    step = 0.5 * np.tanh(0.1) * sides.half
-    np.testing.assert_allclose(found.change, np.broadcast_to([step, 0.0], found.change.shape), atol=1e-5)
+    seen = sides.labels > 0
+    np.testing.assert_allclose(found[seen], np.broadcast_to([0.5 * np.tanh(0.1), 0.0], (seen.sum(), 2)), atol=1e-4)
+    assert not found[~seen].any()
 
 
 def test_untrained_networks_paint_the_front_straight_through(sides: Sides) -> None:
@@ -146,36 +134,10 @@ def test_untrained_networks_paint_the_front_straight_through(sides: Sides) -> No
     assert np.abs(made[2][back] - mirrored[back]).mean() < 1.0
 
 
-def test_points_have_the_colour_of_the_side_that_faces_them(sides: Sides) -> None:
-    flat = np.arange(4, dtype=np.float32)[:, None, None, None] * np.ones((4, SIZE, SIZE, 3), np.float32)
-    views = ViewTextures(sides, flat)
-    for side, yaw in enumerate(VIEW_YAW_DEG.values()):
-        points = sides.points[side][sides.labels[side] > 0]
-        centre = np.array([0.0, 0.0, 0.0])
-        outward = points * [1, 0, 1] - centre
-        outward = outward / np.linalg.norm(outward, axis=1, keepdims=True)
-        straight = (outward @ axes(yaw)[2] > 0.97) & (points[:, 1] < 0.3)
-        colour, weight = views.at(points[straight], outward[straight])
-        if side == 0:
-            assert weight.max() < 0.1, "the front is seen by the drawing itself"
-        else:
-            np.testing.assert_allclose(colour[:, 0], side, atol=0.1)
-            assert weight.min() > 0.8
-
-
-def test_points_behind_others_are_not_seen(sides: Sides) -> None:
-    views = ViewTextures(sides, np.ones((4, SIZE, SIZE, 3), np.float32))
-    inside = np.array([[0.0, 0.0, 0.0]])
-    assert views.at(inside, np.array([[0.0, 0.0, -1.0]]))[1][0] == 0
-
-
-def test_colours_are_brought_to_those_of_the_drawing() -> None:
-    palette = np.array([[0.0, 0, 0], [200, 40, 40]])
-    np.testing.assert_array_equal(snapped(np.array([[20.0, 0, 0], [150, 60, 60]]), palette), palette)
-
-
-def test_changes_are_those_of_the_nearest_points() -> None:
-    changes = Changes(np.array([[0, 0, 0], [1, 0, 0]], np.float32), np.array([[0.1, 0], [0, 0.3]], np.float32))
-    np.testing.assert_allclose(changes.at(np.array([[0.0, 0, 0], [1, 0, 0]])), [[0.1, 0], [0, 0.3]], atol=1e-5)
-    np.testing.assert_allclose(changes.at(np.array([[0.5, 0.2, 0]])), [[0.05, 0.15]], atol=1e-6)
-    assert not NO_CHANGES.at(np.ones((3, 3))).any()
+def test_only_sides_that_the_drawing_does_not_show_are_told_of(body: Body) -> None:
+    frame = ImageFrame((50.0, 60.0), 0.01)
+    picture = np.full((120, 100, 3), 80.0, np.float32)
+    found = unseen_sides(body, POSE, picture, frame, replace(networks(), head=None))
+    assert set(np.unique(found.labels)) == {PART["head"], PART["torso"]}
+    assert len(found.labels) == len(found.points) == len(found.found) > 10_000
+    np.testing.assert_allclose(found.found, found.points, atol=1e-6)

@@ -57,7 +57,7 @@ def test_every_way_paints_every_side(subject: Subject, untrained: TextureNets, r
 
 def test_straight_through_is_the_mirrored_front(subject: Subject, untrained: TextureNets) -> None:
     made = painted(subject, "straight through the body", untrained)
-    np.testing.assert_array_equal(made, painted(subject, ROADS[1], untrained))
+    np.testing.assert_array_equal(made, painted(subject, "coordinates", untrained))
 
 
 def test_comparison_of_a_picture_with_itself_and_with_another() -> None:
