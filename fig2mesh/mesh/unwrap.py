@@ -87,12 +87,11 @@ def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4, drawn: Drawn | No
 
 def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> UvMesh | None:
     """Charts as the drawing has them, and charts of the rest, packed together; None where they do not fit."""
-    front = _part(mesh, drawn.faces)
-    indices, local = front
+    indices, local = _part(mesh, drawn.faces)
     pixels = drawn.pixels[indices]
     rest = _part(mesh, ~drawn.faces)
-    # One drawn pixel on one texel, or on a half or fewer where the texture is small.
-    area = float(_signed_areas(pixels, local).sum())
+    # A drawn pixel is a texel, or less of one where the texture is small.
+    area = float(_flat_areas(pixels, local).sum())
     usable = FILL * texture_size**2
     scale = min(1.0, math.sqrt(DRAWN_SHARE * usable / max(area, 1e-9)))
     units = math.sqrt(area / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
@@ -101,10 +100,9 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
         piece = Mesh(mesh.vertices[rest[0]], rest[1].astype(np.int32))
         source, faces, texels, _ = _pack(piece, texture_size, padding + 1)
         layout = source, faces, _upright(texels, texels[:, 1].max())
-        lengths = math.sqrt(float(_signed_areas(texels, faces).sum()) / max(float(face_areas(piece).sum()), 1e-12))
-        wanted = math.sqrt(
-            max(usable - area * scale**2, 0.1 * usable) / max(float(_signed_areas(texels, faces).sum()), 1e-9)
-        )
+        covered = max(float(_flat_areas(texels, faces).sum()), 1e-9)
+        lengths = math.sqrt(covered / max(float(face_areas(piece).sum()), 1e-12))
+        wanted = math.sqrt(max(usable - area * scale**2, 0.1 * usable) / covered)
         factor = min(wanted, units / lengths)
     for _ in range(12):
         charts = [(pixels * scale, local)]
@@ -143,7 +141,8 @@ def _part(mesh: Mesh, chosen: BoolArray) -> tuple[NDArray[np.int64], NDArray[np.
     return indices.astype(np.int64), local.reshape(-1, 3).astype(np.int64)
 
 
-def _signed_areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _flat_areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(F,) areas of triangles in the plane."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     first, second = b - a, c - a
     return np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2

@@ -18,7 +18,7 @@ from scipy.cluster.vq import kmeans2
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import JOINT, PART, Figure
-from fig2mesh.texture.pen import Pen, find_pen, reinked
+from fig2mesh.texture.pen import DARK, STROKE, Pen, find_pen, reinked
 from fig2mesh.texture.votes import Unseen, voted
 
 CUT_OUT = 64
@@ -44,12 +44,6 @@ PLAIN_SHARE = 0.625
 
 FACE_SHARE = 1.05
 """Half width of the face relative to the head's."""
-
-DARK = 0.3
-"""Relative luminance below which a colour may be ink."""
-
-INK = 0.2
-"""Palette colours of less weight are strokes, not hair."""
 
 LEAST_HAIR = 0.04
 """Share of the head that hair or hat must have to be carried on over its back."""
@@ -243,7 +237,7 @@ def _without_face(
     if not face.any() or not around.any():
         return kind
     skin = int(np.argmax(np.bincount(index[face], minlength=len(weight)) * weight))
-    hair = around & (index != skin) & (weight[index] > INK)
+    hair = around & (index != skin) & (weight[index] > STROKE)
     if hair.sum() < LEAST_HAIR * head.sum():
         hair = around
     return np.where(face, _dominant(index, hair, weight, len(weight), radius), kind)

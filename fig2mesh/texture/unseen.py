@@ -81,7 +81,7 @@ def unseen_changes(
     front : as `front_picture` gives it; uv : (4, H, W, 2)
     """
     seen = sides.labels > 0
-    inner = np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
+    inner = _inwards(seen)
     places = sides.places()
     size = sides.labels.shape[1]
     pixel = np.clip(((places + 1) / 2 * size).astype(int), 0, size - 1)
@@ -100,6 +100,11 @@ def unseen_changes(
     at = torch.from_numpy(2 * uv - 1).movedim(3, 1)
     found = sample(change.expand(len(at), -1, -1, -1), at).movedim(1, 3).numpy()
     return _smoothed(np.where(seen[..., None], found, np.float32(0)), seen)
+
+
+def _inwards(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(4, H, W) how far inside of a side's silhouette each pixel is, pixels; 0 outside."""
+    return np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
 
 
 def _smoothed(change: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -144,7 +149,7 @@ def unseen_sides(
     front = front_picture(picture, frame, sides)
     change = unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
     seen = sides.labels > 0
-    inner = np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
+    inner = _inwards(seen)
     used = inner > LEAST_PX
     used[0] = False
     points = sides.points[used][:, :2]
