@@ -131,14 +131,19 @@ def parts(
 @common("Folder of shards with pictures.")
 @click.option("--masks/--no-masks", default=True, show_default=True, help="Part masks are an input.")
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
-def uv(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, masks: bool) -> None:
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
+def uv(
+    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, masks: bool, lr: float,
+    init: Path | None,
+) -> None:  # fmt: skip
     """Texture coordinates (table 4)."""
     from fig2mesh.nets.uv_unet import UvUnetShape
     from fig2mesh.training.train_uv import train_uv
 
     _say(train_uv(
         data, out, shape=UvUnetShape(masks), budget_min=_minutes("uv", budget, epochs),
-        steps=None if epochs is None else 1000 * epochs, seed=seed, device=_device(device),
+        steps=None if epochs is None else 1000 * epochs, seed=seed, device=_device(device), rate=lr, init=init,
     ))  # fmt: skip
 
 

@@ -10,14 +10,14 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, save_uv, uv_inputs, uv_path
+from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, save_uv, uv_inputs, uv_path
 from fig2mesh.records import PART
 from fig2mesh.training.build import recipe_digest
 from fig2mesh.training.loop import run_loop, seeded
@@ -49,14 +49,20 @@ def train_uv(
     rate: float = RATE,
     device: str = "cpu",
     amp: bool = True,
+    init: Path | None = None,
 ) -> dict[str, float]:
     """Scores on the held-out splits; writes all that training leaves.
 
+    init : folder of an earlier run whose weights training starts from
     amp : compute in bfloat16, which processors that have it do three times as fast
     """
     known = load_drawings(data, ("train",), pictures=False)
     held = {split: load_drawings(data, (split,), pictures=False, most=24) for split in HELD_OUT}
     net = seeded(seed, lambda: UvUnet(shape)).to(device)
+    before: dict[str, Any] = {}
+    if init is not None:
+        other, before = read_uv(uv_path(shape, init))
+        net.load_state_dict(other.state_dict())
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         rows = torch.randint(len(known), (batch,), generator=generator).numpy()
@@ -73,7 +79,8 @@ def train_uv(
     result = run_loop(
         model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
         seed=seed, batch=batch, warmup=100, clip=1.0, device=device, amp=amp, validations=6,
-        arguments={"masks": shape.masks, "filters": shape.filters, "data": recipe_digest(data)},
+        arguments={"masks": shape.masks, "filters": shape.filters, "data": recipe_digest(data),
+                   "init_samples": before.get("samples", 0)},
     )  # fmt: skip
     found = {f"{split}_{name}": value for split, drawings in held.items()
              for name, value in scores(net, drawings, device).items()}  # fmt: skip
@@ -81,7 +88,7 @@ def train_uv(
     part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     os.replace(part, out / "scores.json")
     facts = {"data": recipe_digest(data), "bodies": len(known), "seed": seed, "steps": result.steps,
-             "samples": result.samples, "scores": found}  # fmt: skip
+             "samples": before.get("samples", 0) + result.samples, "scores": found}  # fmt: skip
     save_uv(uv_path(shape, out), net, facts)
     return found
 
