@@ -93,7 +93,8 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
     # A drawn pixel is a texel, or less of one where the texture is small.
     area = float(_flat_areas(pixels, local).sum())
     usable = FILL * texture_size**2
-    scale = min(1.0, math.sqrt(DRAWN_SHARE * usable / max(area, 1e-9)))
+    longest = float(np.ptp(pixels, axis=0).max())
+    scale = min(1.0, math.sqrt(DRAWN_SHARE * usable / max(area, 1e-9)), (texture_size - 4 * padding - 4) / longest)
     units = math.sqrt(area / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
     layout = None
     if len(rest[1]):
@@ -176,15 +177,24 @@ def _place(
         # Charts are numbered through all layouts.
         _, chart = np.unique(np.asarray(atlas.get_mesh_vertex_assignment(number)[1]), return_inverse=True)
         found, before = uv.astype(np.float64) * size, positions[vertex]
-        low = np.full((chart.max() + 1, 2), np.inf)
-        start = low.copy()
-        np.minimum.at(low, chart, found)
-        np.minimum.at(start, chart, before)
+        low, start = _lowest(found, chart), _lowest(before, chart)
+        # What does not fit xatlas shrinks, without a word.
+        if (-_lowest(-found, chart) - low < -_lowest(-before, chart) - start - 0.5).any():
+            return None
         moved = before + np.round(low - start)[chart]
+        if moved.min() < -0.5 or moved.max() > resolution + 0.5:
+            return None
         # xatlas splits vertices between charts only, so faces keep their corners.
         by_source = np.empty((len(positions), 2))
         by_source[vertex] = moved
         result.append((by_source, faces))
+    return result
+
+
+def _lowest(points: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(C, 2) least coordinates of the points of each chart."""
+    result = np.full((int(chart.max()) + 1, 2), np.inf)
+    np.minimum.at(result, chart, points)
     return result
 
 

@@ -30,7 +30,7 @@ UNLIKE = 16.0
 LEAST_ALPHA = 64
 """Alpha above which a pixel's colour is known well enough."""
 
-COLOURS = 12
+COLOURS = 16
 """Palette size; flat drawings have fewer, shaded ones lose little."""
 
 WINDOW = 0.022
@@ -103,12 +103,12 @@ def make_sources(
             own = labels > 0
         kind = _dominant(index, own, ink, len(palette), WINDOW / pitch)
         for part in parts:
-            areas, group = kind, parts
+            areas = kind
             if part == PART["head"]:
+                # Networks tell worst where on a head they are: half of their errors are there.
                 areas = _without_face(kind, labels == part, face, index, ink, 0.5 * radius / pitch)
-                group = [part]
-            if unseen is not None:
-                chosen = np.isin(unseen.labels, group)
+            elif unseen is not None:
+                chosen = np.isin(unseen.labels, parts)
                 pixels, named = (
                     np.floor(frame.image_from_figure(places[chosen].astype(np.float64))[:, ::-1] / factor).astype(int)
                     for places in (unseen.points, unseen.found)

@@ -136,6 +136,27 @@ def test_what_is_drawn_lies_in_the_texture_as_drawn(size: int, exact: bool) -> N
         assert 0.2 < scale < 1.0
 
 
+@pytest.mark.parametrize("size", [64, 128, 512])
+def test_a_drawing_larger_than_the_texture_fits_whole(size: int) -> None:
+    """A long thin figure of 3,000 pixels: its area would fit sooner than its length."""
+    solid = closed("capsule")
+    longest = int(np.ptp(solid.vertices, axis=0).argmax())
+    tall = Mesh(np.roll(solid.vertices, 1 - longest, axis=1) * np.array([1, 4, 1], np.float32), solid.faces)
+    pixels = tall.vertices[:, :2].astype(np.float64)
+    pixels *= 3000 / np.ptp(pixels[:, 1]) * np.array([1, -1])
+    front = Drawn(drawn_faces(tall), pixels)
+    mesh = unwrap(tall, texture_size=size, drawn=front)
+    assert mesh.uv.min() >= 0
+    assert mesh.uv.max() <= 1
+    rows = mesh.faces[front.faces]
+    drawn_at = front.pixels[mesh.solid_index[rows]]
+    texels = mesh.uv.astype(np.float64)[rows] * size
+    for axis in range(2):
+        scale = np.ptp(texels[..., axis]) / np.ptp(drawn_at[..., axis])
+        assert scale == pytest.approx(np.ptp(texels[..., 1]) / np.ptp(drawn_at[..., 1]), rel=0.02)
+    assert not painted(mesh, 2)[1]
+
+
 def test_drawn_charts_keep_apart_from_the_others() -> None:
     solid = closed("overlapping")
     mesh = unwrap(solid, texture_size=128, padding=4, drawn=drawn(solid))
