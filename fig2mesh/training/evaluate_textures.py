@@ -192,7 +192,12 @@ def face_share(made_place: NDArray[np.floating], subject: Subject) -> float:
 def evaluate_textures(data: Path, runs: Path | None, bodies: int, say: Say = lambda line: None) -> str:
     """The report as Markdown; runs : folder of networks that are not shipped: without masks, and those that refine."""
     say("Table 4: texture coordinates")
-    sections = ["## Table 4: texture coordinates", _uv_table(data, runs, bodies)]
+    sections = [
+        "# Textures",
+        "Written by `fig2mesh evaluate textures`; [training.md](training.md) says how data and weights were made.",
+        "## Table 4: texture coordinates",
+        _uv_table(data, runs, bodies),
+    ]
     say("Unseen sides")
     sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs))]
     return "\n\n".join(sections) + "\n"
