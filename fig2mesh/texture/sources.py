@@ -102,19 +102,20 @@ def make_sources(
         if not own.any():
             own = labels > 0
         kind = _dominant(index, own, ink, len(palette), WINDOW / pitch)
-        for part in parts:
-            areas = kind
-            if part == PART["head"]:
-                # Networks tell worst where on a head they are: half of their errors are there.
-                areas = _without_face(kind, labels == part, face, index, ink, 0.5 * radius / pitch)
-            elif unseen is not None:
-                chosen = np.isin(unseen.labels, parts)
-                pixels, named = (
-                    np.floor(frame.image_from_figure(places[chosen].astype(np.float64))[:, ::-1] / factor).astype(int)
-                    for places in (unseen.points, unseen.found)
-                )
-                areas = voted(areas, pixels, named)
-            plain[part] = reinked(palette, areas, own, pen)
+        if PART["head"] in parts:
+            # Networks tell worst where on a head they are: half of their errors are there.
+            areas = _without_face(kind, labels == PART["head"], face, index, ink, 0.5 * radius / pitch)
+            plain[PART["head"]] = reinked(palette, areas, own, pen)
+            parts.remove(PART["head"])
+        if parts and unseen is not None:
+            chosen = np.isin(unseen.labels, parts)
+            pixels, named = (
+                np.floor(frame.image_from_figure(places[chosen].astype(np.float64))[:, ::-1] / factor).astype(int)
+                for places in (unseen.points, unseen.found)
+            )
+            kind = voted(kind, pixels, named)
+        if parts:
+            plain |= dict.fromkeys(parts, reinked(palette, kind, own, pen))
     pen = None if pen is None else replace(pen, width=pen.width * pitch)
     return Sources(seen, plain, 1.0 / factor, pen)
 
