@@ -97,10 +97,10 @@ def drawn_faces(mesh: Mesh) -> NDArray[np.bool_]:
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     a, b, c = (corners[:, i] for i in range(3))
     flat = np.cross(b - a, c - a)
-    seen = flat[:, 2] > 0
-    for weights in _LOOKS:
-        rows = np.flatnonzero(seen)
-        seen[rows] = _seen(mesh, rows, np.einsum("k,nkd->nd", weights, corners[rows]), flat[rows])
+    seen = np.asarray(flat[:, 2] > 0)
+    face = np.tile(np.flatnonzero(seen), len(_LOOKS))
+    points = np.einsum("lk,nkd->lnd", _LOOKS, corners[seen]).reshape(-1, 3)
+    seen[seen] = _seen(mesh, face, points, flat[face]).reshape(len(_LOOKS), -1).all(axis=0)
     return seen
 
 

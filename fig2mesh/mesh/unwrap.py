@@ -25,7 +25,6 @@ PATCH = 8_000
 ESTIMATE = 0.78
 """xatlas takes the size of a texture as a wish and exceeds it by a quarter; asked for this share it about fits."""
 
-
 FILL = 0.62
 """Share of a texture that charts of figures fill."""
 

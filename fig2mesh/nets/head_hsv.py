@@ -18,7 +18,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 
 SIZE: Final = 64
@@ -175,14 +174,7 @@ def save_head(path: Path, net: HeadHsv, facts: Mapping[str, Any]) -> None:
 
 def read_head(path: Path) -> tuple[HeadHsv, dict[str, Any]]:
     """A network, ready for inference, and its facts."""
-    state, facts = weights.read(path)
-    try:
-        net = HeadHsv(HeadShape(**facts["shape"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a head network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, weights.REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return weights.read_module(path, lambda shape: HeadHsv(HeadShape(**shape)), "head network")
 
 
 @functools.cache

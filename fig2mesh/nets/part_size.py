@@ -18,7 +18,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.parts.kinds import ANCHORS, KINDS, MIRRORED, PART_KIND, anchor_joints, part_centre
 
@@ -104,14 +103,7 @@ def save_size(path: Path, net: PartSizeNet, facts: Mapping[str, Any]) -> None:
 
 def read_size(path: Path) -> tuple[PartSizeNet, dict[str, Any]]:
     """A size network, ready for inference, and its facts."""
-    state, facts = weights.read(path)
-    try:
-        net = PartSizeNet(SizeShape(**facts["shape"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a size network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, weights.REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return weights.read_module(path, lambda shape: PartSizeNet(SizeShape(**shape)), "size network")
 
 
 @functools.cache

@@ -19,7 +19,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import JOINT, JOINT_NAMES
@@ -235,14 +234,7 @@ def save_pose(path: Path, net: PoseLift, facts: Mapping[str, Any]) -> None:
 
 def read_pose(path: Path) -> tuple[PoseLift, dict[str, Any]]:
     """A pose network, ready for inference, and its facts."""
-    state, facts = weights.read(path)
-    try:
-        net = PoseLift(PoseLiftShape(**facts["shape"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a pose network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, weights.REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return weights.read_module(path, lambda shape: PoseLift(PoseLiftShape(**shape)), "pose network")
 
 
 @functools.cache

@@ -18,7 +18,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import Hourglass
 
@@ -89,14 +88,7 @@ def save_fill(path: Path, net: TextureFill, facts: Mapping[str, Any]) -> None:
 
 def read_fill(path: Path) -> tuple[TextureFill, dict[str, Any]]:
     """A network, ready for inference, and its facts."""
-    state, facts = weights.read(path)
-    try:
-        net = TextureFill(FillShape(**facts["shape"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a texture network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, weights.REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return weights.read_module(path, lambda shape: TextureFill(FillShape(**shape)), "texture network")
 
 
 @functools.cache

@@ -11,13 +11,9 @@ from typing import Any, Final
 import torch
 from torch import Tensor
 
-from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import FILTERS, Hourglass
 from fig2mesh.records import BODY_PARTS
-
-SIZE: Final = 256
-"""Pixels of a picture's edge (paper §4.3)."""
 
 PARTS: Final = len(BODY_PARTS)
 
@@ -84,14 +80,7 @@ def save_uv(path: Path, net: UvUnet, facts: Mapping[str, Any]) -> None:
 
 def read_uv(path: Path) -> tuple[UvUnet, dict[str, Any]]:
     """A network, ready for inference, and its facts."""
-    state, facts = weights.read(path)
-    try:
-        net = UvUnet(UvUnetShape(**facts["shape"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a UV network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, weights.REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return weights.read_module(path, lambda shape: UvUnet(UvUnetShape(**shape)), "UV network")
 
 
 @functools.cache

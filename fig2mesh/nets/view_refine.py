@@ -15,7 +15,6 @@ from typing import Any, Final
 import torch
 from torch import Tensor
 
-from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import Hourglass
 from fig2mesh.nets.uv_unet import uv_inputs
@@ -69,14 +68,7 @@ def save_refine(path: Path, net: ViewRefine, facts: Mapping[str, Any]) -> None:
 
 def read_refine(path: Path) -> tuple[ViewRefine, dict[str, Any]]:
     """A network, ready for inference, and its facts."""
-    state, facts = weights.read(path)
-    try:
-        net = ViewRefine(RefineShape(**facts["shape"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a refining network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, weights.REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return weights.read_module(path, lambda shape: ViewRefine(RefineShape(**shape)), "refining network")
 
 
 @functools.cache

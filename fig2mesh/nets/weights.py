@@ -9,15 +9,17 @@ from __future__ import annotations
 import functools
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
 from fig2mesh.nets.disn import Disn, DisnShape
+
+M = TypeVar("M", bound=nn.Module)
 
 FOLDER: Final = Path(__file__).resolve().parent.parent / "weights"
 KEY: Final = "fig2mesh"
@@ -56,6 +58,21 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return {name: value.float() if value.is_floating_point() else value for name, value in state.items()}, facts
 
 
+def read_module(path: Path, make: Callable[[dict[str, Any]], M], what: str) -> tuple[M, dict[str, Any]]:
+    """A network, ready for inference, and its facts.
+
+    make : network from the shape among the facts; what : it is called, "pose network"
+    """
+    state, facts = read(path)
+    try:
+        net = make(facts["shape"])
+        net.load_state_dict(state)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        finding = f"not the weights of a {what} ({str(error).splitlines()[0]})"
+        raise InputError(path, finding, REINSTALL) from None
+    return net.eval().requires_grad_(False), facts
+
+
 def disn_path(shape: DisnShape, folder: Path = FOLDER) -> Path:
     """Where the weights of a part network are."""
     return folder / f"disn-{shape.kind}-{shape.variant}.safetensors"
@@ -69,14 +86,7 @@ def save_disn(path: Path, net: Disn, facts: Mapping[str, Any]) -> None:
 
 def read_disn(path: Path) -> tuple[Disn, dict[str, Any]]:
     """A part network, ready for inference, and its facts."""
-    state, facts = read(path)
-    try:
-        net = Disn(DisnShape.of(facts["shape"]["kind"], facts["shape"]["variant"]))
-        net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        finding = f"not the weights of a part network ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
+    return read_module(path, lambda shape: Disn(DisnShape.of(shape["kind"], shape["variant"])), "part network")
 
 
 @functools.cache

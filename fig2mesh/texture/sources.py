@@ -101,7 +101,7 @@ def make_sources(
         own = np.isin(labels, parts)
         if not own.any():
             own = labels > 0
-        kind = _dominant(index, own, ink, len(palette), WINDOW / pitch)
+        kind = _dominant(index, own, ink, WINDOW / pitch)
         if PART["head"] in parts:
             # Networks tell worst where on a head they are: half of their errors are there.
             areas = _without_face(kind, labels == PART["head"], face, index, ink, 0.5 * radius / pitch)
@@ -205,13 +205,12 @@ def _dominant(
     index: NDArray[np.int_],
     own: NDArray[np.bool_],
     weight: NDArray[np.float64],
-    count: int,
     radius: float,
 ) -> NDArray[np.int_]:
     """(h, w) index of the colour that dominates the neighbourhood among the pixels `own`; continued everywhere."""
     best = np.zeros(index.shape)
     chosen = np.zeros(index.shape, int)
-    for i in range(count):
+    for i in range(len(weight)):
         member = (own & (index == i)).astype(np.float32)
         if member.any():
             votes = weight[i] * ndimage.gaussian_filter(member, radius / 1.5)
@@ -241,7 +240,7 @@ def _without_face(
     hair = around & (index != skin) & (weight[index] > STROKE)
     if hair.sum() < LEAST_HAIR * head.sum():
         hair = around
-    return np.where(face, _dominant(index, hair, weight, len(weight), radius), kind)
+    return np.where(face, _dominant(index, hair, weight, radius), kind)
 
 
 def _face(

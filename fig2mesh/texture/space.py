@@ -6,9 +6,35 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 SIZE: Final = 128
 """Texels of an edge: four pictures of 256 x 256 pixels cover nearly all that a body has of that many."""
+
+INNER_PX: Final = 5.0
+"""Pixels this far inside of a side's silhouette count in full: at its rim there is the contour, seen at a slant."""
+
+
+def inwards(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(..., H, W) how far inside of its silhouette each pixel of pictures is, pixels; 0 outside."""
+    flat = seen.reshape(-1, *seen.shape[-2:])
+    away = [ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in flat]
+    return np.stack(away).reshape(seen.shape)
+
+
+def shown_alike(labels: NDArray[np.uint8], places: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """(4, H, W) whether the front shows the same part where each pixel's point lies behind it.
+
+    labels : (4, H, W) parts, the front first; places : (4, H, W, 2) in the front picture, edges at -1 and 1
+    """
+    size = labels.shape[1]
+    pixel = np.clip(((places + 1) / 2 * size).astype(int), 0, size - 1)
+    return np.asarray(labels[0][pixel[..., 1], pixel[..., 0]] == labels)
+
+
+def trust(inner: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights of pixels by how far inside they are."""
+    return np.clip(inner / INNER_PX, 0.05, 1.0)
 
 
 def spread(

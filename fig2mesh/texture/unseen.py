@@ -23,11 +23,8 @@ from fig2mesh.nets.view_refine import ViewRefine, refine
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import PART, Pose3D
 from fig2mesh.texture.sides import Sides, look_around
-from fig2mesh.texture.space import spread
+from fig2mesh.texture.space import inwards, shown_alike, spread, trust
 from fig2mesh.texture.votes import Unseen
-
-INNER_PX: Final = 5.0
-"""Pixels this far inside of a side's silhouette count in full."""
 
 SMOOTH_PX: Final = 2.5
 """Spread of the average over changes, pixels."""
@@ -81,15 +78,12 @@ def unseen_changes(
     front : as `front_picture` gives it; uv : (4, H, W, 2)
     """
     seen = sides.labels > 0
-    inner = _inwards(seen)
     places = sides.places()
-    size = sides.labels.shape[1]
-    pixel = np.clip(((places + 1) / 2 * size).astype(int), 0, size - 1)
-    same = sides.labels[0][pixel[..., 1], pixel[..., 0]] == sides.labels
+    same = shown_alike(sides.labels, places)
     is_front = np.zeros(seen.shape, bool)
     is_front[0] = True
     values = np.concatenate([places, is_front[..., None], same[..., None]], axis=-1)
-    weight = np.clip(inner / INNER_PX, 0.05, 1.0)
+    weight = trust(inwards(seen))
     texels, total = spread(uv[seen], values[seen], weight[seen], net.shape.size)
     there = torch.from_numpy(total > 0)[None]
     place = torch.from_numpy(texels[..., :2]).movedim(2, 0)[None]
@@ -100,11 +94,6 @@ def unseen_changes(
     at = torch.from_numpy(2 * uv - 1).movedim(3, 1)
     found = sample(change.expand(len(at), -1, -1, -1), at).movedim(1, 3).numpy()
     return _smoothed(np.where(seen[..., None], found, np.float32(0)), seen)
-
-
-def _inwards(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(4, H, W) how far inside of a side's silhouette each pixel is, pixels; 0 outside."""
-    return np.stack([ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in seen])
 
 
 def _smoothed(change: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -148,9 +137,7 @@ def unseen_sides(
     sides = look_around(body, pose)
     front = front_picture(picture, frame, sides)
     change = unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
-    seen = sides.labels > 0
-    inner = _inwards(seen)
-    used = inner > LEAST_PX
+    used = inwards(sides.labels > 0) > LEAST_PX
     used[0] = False
     points = sides.points[used][:, :2]
     found = points + change[used] * np.array([sides.half, -sides.half], np.float32)

@@ -23,18 +23,16 @@ from fig2mesh.nets.view_refine import read_refine, refine_path
 from fig2mesh.paper import UV_SCORES
 from fig2mesh.records import JOINT, PART, Pose3D
 from fig2mesh.texture.sides import Sides, body_labels
-from fig2mesh.texture.space import spread
+from fig2mesh.texture.space import inwards, spread
 from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
 from fig2mesh.training.build import read_shard, shards
 from fig2mesh.training.evaluate import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.texture_data import Drawings, load_drawings
 from fig2mesh.training.train_uv import scores
-from fig2mesh.training.unfold import places
+from fig2mesh.training.unfold import carried_on, places
 
 Picture = NDArray[np.float32]
 Say = Callable[[str], None]
-
-VIEW_NAMES: Final = ("front", "left", "back", "right")
 
 ROADS: Final = (
     "coordinates, refined, heads", "coordinates, refined", "coordinates",
@@ -95,8 +93,6 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
     seen = labels > 0
     points = np.concatenate([place * [half, -half], z[..., None]], axis=-1)
     points = np.where(seen[..., None], points, 0.0).astype(np.float32)
-    inner = ndimage.distance_transform_edt(np.pad(seen[0], 1))[1:-1, 1:-1]
-    nearest = ndimage.distance_transform_edt(inner < 2, return_distances=False, return_indices=True)
     picture = drawings.picture[row].astype(np.float32)
     # Joints are relative to the pelvis, pictures to the middle of the figure's box.
     middle_x = (left + right) / 2
@@ -117,7 +113,7 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
         face = (across**2 + np.where(up > 0, up / FACE_UP, up / FACE_DOWN) ** 2 < 1) & own
     pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * 0.9], joints[:, 2:]], axis=1))
     sides = Sides(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
-    return Subject(sides, picture[0][tuple(nearest)], picture, face)
+    return Subject(sides, carried_on(picture[0], inwards(seen[0])), picture, face)
 
 
 def painted(subject: Subject, road: str, nets: TextureNets) -> Picture:

@@ -12,6 +12,7 @@ threads give the same weights, and an interrupted run that is resumed gives thos
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import time
@@ -30,6 +31,7 @@ from fig2mesh.errors import InputError
 CHECKPOINT = "checkpoint.pt"
 LOG = "log.csv"
 CURVE = "curve.png"
+SCORES = "scores.json"
 
 ROWS_A_VALIDATION = 10
 """Rows of the log from one validation to the next."""
@@ -243,6 +245,13 @@ def write_log(path: Path, rows: list[dict[str, float]]) -> None:
         writer.writerow(columns)
         writer.writerows([f"{row[name]:.6g}" if name in row else "" for name in columns] for row in rows)
     os.replace(part, path)
+
+
+def write_scores(folder: Path, scores: Mapping[str, float]) -> None:
+    """Write the scores of a finished run, whole or not at all."""
+    part = folder / (SCORES + ".part")
+    part.write_text(json.dumps(dict(scores), indent=1) + "\n", encoding="utf-8")
+    os.replace(part, folder / SCORES)
 
 
 def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:

@@ -6,8 +6,6 @@ the same for colours taken straight through the body (`front_psnr`), which is wh
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -19,14 +17,13 @@ from torch.nn import functional
 
 from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, fill_path, sample, save_fill
 from fig2mesh.training.build import recipe_digest
-from fig2mesh.training.loop import run_loop, seeded
+from fig2mesh.training.loop import run_loop, seeded, write_scores
+from fig2mesh.training.part_data import HELD_OUT
 from fig2mesh.training.texture_data import load_drawings
 from fig2mesh.training.unfold import Unfolded, unfold
 
 BATCH: Final = 8
 RATE: Final = 2e-3
-
-HELD_OUT: Final = ("valid-clips", "valid-characters")
 
 SEEN_WEIGHT: Final = 0.2
 """Texels that the front shows count so much beside those it does not."""
@@ -86,9 +83,7 @@ def train_fill(
     )  # fmt: skip
     found = {f"{split}_{name}": value for split, bodies in held.items()
              for name, value in scores(net, bodies, device).items()}  # fmt: skip
-    part = out / "scores.json.part"
-    part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, out / "scores.json")
+    write_scores(out, found)
     facts = {"data": recipe_digest(data), "bodies": len(known), "seed": seed, "steps": result.steps,
              "samples": result.samples, "scores": found}  # fmt: skip
     save_fill(fill_path(out), net, facts)

@@ -9,8 +9,6 @@ distance is that of depths.
 from __future__ import annotations
 
 import hashlib
-import json
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +20,7 @@ from torch import Tensor
 
 from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, bone_lengths, lift, pose_path, save_pose
 from fig2mesh.records import JOINT, JOINT_NAMES
-from fig2mesh.training.loop import run_loop, seeded
+from fig2mesh.training.loop import run_loop, seeded, write_scores
 from fig2mesh.training.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, View
 
 if TYPE_CHECKING:
@@ -97,9 +95,7 @@ def train_pose(
         for name, view in VIEWS.items()
         for score, value in pose_scores(net, _held(held, view, shape, COUNT)).items()
     }
-    part = out / "scores.json.part"
-    part.write_text(json.dumps(scores, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, out / "scores.json")
+    write_scores(out, scores)
     data = {"poses": len(train.rotations), "bodies": len(train.reach), "augment": augment}
     facts = {"data": data, "seed": seed, "steps": result.steps, "samples": result.samples, "scores": scores}
     save_pose(pose_path(shape, out), net, facts)

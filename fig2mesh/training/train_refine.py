@@ -5,9 +5,7 @@ Scores are over unseen sides: mean absolute error of colours 0-1, and the same f
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
@@ -31,15 +29,14 @@ from fig2mesh.nets.texture_fill import fill_path, read_fill
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine, refine, refine_inputs, refine_path, save_refine
 from fig2mesh.records import PART
 from fig2mesh.training.build import recipe_digest
-from fig2mesh.training.loop import Result, run_loop, seeded
+from fig2mesh.training.loop import Result, run_loop, seeded, write_scores
 from fig2mesh.training.painted import Painter, Sides, painters
+from fig2mesh.training.part_data import HELD_OUT
 
 BATCH: Final = 8
 HEADS: Final = 32
 RATE: Final = 1e-3
 EDGE_WEIGHT: Final = 0.5
-
-HELD_OUT: Final = ("valid-clips", "valid-characters")
 
 Scores = dict[str, float]
 
@@ -204,8 +201,6 @@ def _run(
 
 
 def _facts(data: Path, bodies: int, seed: int, result: Result, found: Scores, out: Path) -> dict[str, object]:
-    part = out / "scores.json.part"
-    part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, out / "scores.json")
+    write_scores(out, found)
     return {"data": recipe_digest(data), "bodies": bodies, "seed": seed, "steps": result.steps,
             "samples": result.samples, "scores": found}  # fmt: skip

@@ -6,8 +6,6 @@ the edge of its cube: with the mask of the whole part, with the mask of what is 
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +21,7 @@ from fig2mesh.nets.part_size import OUTPUTS, PartSizeNet, SizeShape, bone_unit, 
 from fig2mesh.parts.kinds import MIRRORED, PART_KIND, anchor_joints
 from fig2mesh.records import _Checked
 from fig2mesh.training.build import read_shard, recipe_digest, shards
-from fig2mesh.training.loop import run_loop, seeded
+from fig2mesh.training.loop import run_loop, seeded, write_scores
 
 BATCH: Final = 512
 RATE: Final = 3e-3
@@ -153,9 +151,7 @@ def train_size(
     scores = {
         f"{split}_{name}": value for split, columns in held.items() for name, value in size_scores(net, columns).items()
     }
-    part = out / "scores.json.part"
-    part.write_text(json.dumps(scores, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, out / "scores.json")
+    write_scores(out, scores)
     facts = {
         "data": {"parts": len(known.size), "name": data.name}, "seed": seed, "steps": result.steps,
         "samples": result.samples, "scores": scores,

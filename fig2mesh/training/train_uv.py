@@ -6,8 +6,6 @@ together, in texture units (0 to 1).
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -20,14 +18,13 @@ from torch.nn import functional
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, save_uv, uv_inputs, uv_path
 from fig2mesh.records import PART
 from fig2mesh.training.build import recipe_digest
-from fig2mesh.training.loop import run_loop, seeded
+from fig2mesh.training.loop import run_loop, seeded, write_scores
+from fig2mesh.training.part_data import HELD_OUT
 from fig2mesh.training.texture_data import Drawings, load_drawings
 
 BATCH: Final = 8
 RATE: Final = 2e-3
 MASK_WEIGHT: Final = 0.05
-
-HELD_OUT: Final = ("valid-clips", "valid-characters")
 
 COARSE: Final = 0.03
 """Depths of training are off by smooth errors of this size (one sigma), FIGURE units: inferred bodies are smoother
@@ -84,9 +81,7 @@ def train_uv(
     )  # fmt: skip
     found = {f"{split}_{name}": value for split, drawings in held.items()
              for name, value in scores(net, drawings, device).items()}  # fmt: skip
-    part = out / "scores.json.part"
-    part.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, out / "scores.json")
+    write_scores(out, found)
     facts = {"data": recipe_digest(data), "bodies": len(known), "seed": seed, "steps": result.steps,
              "samples": before.get("samples", 0) + result.samples, "scores": found}  # fmt: skip
     save_uv(uv_path(shape, out), net, facts)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.records import PART
-from fig2mesh.texture.space import SIZE, spread
+from fig2mesh.texture.space import SIZE, inwards, shown_alike, spread, trust
 from fig2mesh.training.texture_data import Drawings
 
-INNER_PX: Final = 5.0
-"""Pixels this far inside of a view's silhouette count in full: at its rim there is the contour, seen at a slant."""
+P = TypeVar("P", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,16 @@ def places(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> NDArray[np
     return result
 
 
+def carried_on(picture: NDArray[P], inner: NDArray[np.float64]) -> NDArray[P]:
+    """(H, W, 3) a picture whose colours go on beyond the silhouette; its rim is mixed with the ground.
+
+    inner : (H, W) how far inside each pixel is, see `inwards`
+    """
+    nearest = ndimage.distance_transform_edt(inner < 2, return_distances=False, return_indices=True)
+    result: NDArray[P] = picture[tuple(nearest)]
+    return result
+
+
 def unfold(drawings: Drawings) -> Unfolded:
     """All bodies of `drawings`."""
     columns: list[tuple[NDArray[np.generic], ...]] = [_unfold(drawings, row) for row in range(len(drawings))]
@@ -80,12 +89,10 @@ def _unfold(drawings: Drawings, row: int) -> tuple[NDArray[np.generic], ...]:
     labels, uv = drawings.labels[row], drawings.uv[row].astype(np.float32)
     where = places(labels, drawings.depth[row])
     known = (labels > 0) & (labels != PART["garment"])
-    inner = np.stack([ndimage.distance_transform_edt(np.pad(view > 0, 1))[1:-1, 1:-1] for view in labels])
-    weight = np.clip(inner / INNER_PX, 0.05, 1.0)
+    inner = inwards(labels > 0)
+    weight = trust(inner)
     colour = drawings.picture[row].astype(np.float32)
-    size = labels.shape[1]
-    pixel = np.clip(((where + 1) / 2 * size).astype(int), 0, size - 1)
-    same = labels[0][pixel[..., 1], pixel[..., 0]] == labels
+    same = shown_alike(labels, where)
     front = np.zeros(labels.shape, bool)
     front[0] = True
     values = np.concatenate([where, colour, front[..., None], same[..., None]], axis=-1)
@@ -94,9 +101,8 @@ def _unfold(drawings: Drawings, row: int) -> tuple[NDArray[np.generic], ...]:
     cell = np.clip((uv[known] * SIZE).astype(int), 0, SIZE - 1)
     part[cell[:, 1], cell[:, 0]] = labels[known]
     there = total > 0
-    nearest = ndimage.distance_transform_edt(inner[0] < 2, return_distances=False, return_indices=True)
     return (
         means[..., :2].astype(np.float16), there, means[..., 5] > 0, means[..., 6] > 0.5,
         np.clip(np.round(means[..., 2:5]), 0, 255).astype(np.uint8), np.clip(total, 0, 1).astype(np.float16), part,
-        drawings.picture[row, 0][tuple(nearest)], labels[0] > 0,
+        carried_on(drawings.picture[row, 0], inner[0]), labels[0] > 0,
     )  # fmt: skip
