@@ -24,7 +24,7 @@ SHARD = 50
 
 VALID_SHARD = 8
 RECIPE = "build.json"
-VERSION = 1
+VERSION = 2
 """Counts changes of what samples hold, so that data of an older recipe is not mixed with new."""
 
 _PACK: dict[str, Pack] = {}

@@ -51,6 +51,7 @@ def draw(
     face: Face | None = None,
     grain: float | None = None,
     shrink: int = 1,
+    paper: Picture | None = None,
 ) -> NDArray[np.uint8]:
     """(H / shrink, W / shrink, 3) uint8, opaque.
 
@@ -59,13 +60,14 @@ def draw(
     face : where the face is; None when the viewer does not see it
     grain : UV units that one figure height takes; None to measure it in this picture
     shrink : average this many pixels a side into one, for smooth edges
+    paper : (H, W, 3) 0-255 what is drawn on; None to draw one of the style's kind
     """
     style = random_style(materials, rng, colours) if style is None else style
     layers = layers._replace(material=_without_eyes(layers.material, materials))
     seen = layers.material >= 0
     shape = (seen.shape[0], seen.shape[1])
     scale = shape[0] / 256
-    paper = draw_background(style.background, shape, rng)
+    paper = draw_background(style.background, shape, rng) if paper is None else paper
     picture = _filled(paper, layers, seen, style, rng, grain)
     lines = ink(layers, style, rng)
     if face is not None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.records import JOINT, PART
+from fig2mesh.training.background import draw_background
 from fig2mesh.training.drawing import Layers, draw
 from fig2mesh.training.faces import Face
 from fig2mesh.training.garments import vertex_normals
@@ -36,12 +37,14 @@ def draw_views(subject: Subject, rng: np.random.Generator) -> dict[str, NDArray[
     if subject.colours is not None and rng.random() < 0.3:
         colours = np.concatenate([subject.colours, rng.uniform(0, 1, (1, 3))]) * 255
     style = random_style(materials, rng, colours)
+    # One sheet for all sides: through glazes, and where nothing is filled, it gives figures their colours.
+    paper = draw_background(style.background, (SIZE * SHRINK, SIZE * SHRINK), rng)
     out: dict[str, list[NDArray[Any]]] = {"picture": [], "labels": [], "depth": [], "uv": []}
     for view in range(4):
         raster, labels, corner, pitch = scene(subject, view, SIZE * SHRINK)
         layers, uv = _layers(subject, view, raster, labels)
         face = _face(subject.joints @ VIEWS[view].T, corner, pitch)
-        out["picture"].append(draw(layers, materials, rng, style=style, face=face, shrink=SHRINK))
+        out["picture"].append(draw(layers, materials, rng, style=style, face=face, shrink=SHRINK, paper=paper))
         middle = np.s_[SHRINK // 2 :: SHRINK, SHRINK // 2 :: SHRINK]
         out["labels"].append(labels[middle])
         out["depth"].append(raster.depth[middle].astype(np.float16))
