@@ -96,6 +96,11 @@ def cli() -> None:
     help="Unseen sides as networks paint them (default), or in the plain colours of what is drawn before them (default "
     "with --parts outline); or no texture at all.",
 )  # fmt: skip
+@click.option(
+    "--contours", type=click.Choice(["keep", "drop"]), default="keep", show_default=True,
+    help="The line drawn around the figure: on the surface, like the drawing from the front and a dark band from the "
+    "side; or left away, for clients that draw silhouettes.",
+)  # fmt: skip
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)

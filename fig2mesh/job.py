@@ -54,6 +54,7 @@ def run(
     visible_from: float,
     parts: str,
     textures: str | None,
+    contours: str,
     mesher: str,
     closing: str,
     device: str,
@@ -87,7 +88,7 @@ def run(
         lods = 1
     settings = settings_for(
         quality, triangles=triangles, texture_size=texture_size, lods=lods, mesher=mesher, closing=closing,
-        parts=parts, textures=textures, device=_device(device), seed=seed,
+        parts=parts, textures=textures, contours=contours, device=_device(device), seed=seed,
     )  # fmt: skip
     stages = None if save_stages is None else _stages(save_stages, drawn, settings, resume_from)
 

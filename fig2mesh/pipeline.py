@@ -98,7 +98,10 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
             return unseen_sides(body, pose, picture, frame, shipped())
 
         inferred = settings.textures == "network"
-        return make_sources(figure, frame, outline, settings.texture_size, settings.seed, ask if inferred else None)
+        return make_sources(
+                figure, frame, outline, settings.texture_size, settings.seed, ask if inferred else None,
+                contours=settings.contours == "keep",
+            )  # fmt: skip
 
     def bake_levels(figure: Figure, sources: Sources, body: Body, unwrapped: tuple[UvMesh, ...]) -> tuple[Baked, ...]:
         frame = image_frame(figure)

@@ -10,6 +10,7 @@ Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
 Textures = Literal["network", "plain", "none"]
+Contours = Literal["keep", "drop"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Settings:
     closing : what closes the holes that ball pivoting leaves
     parts : what depths come from: networks, or rules and the outline alone
     textures : of unseen sides: as networks paint them, or plain colours of what is drawn before them; none at all
+    contours : of the silhouette, if drawn: kept on the surface, or left to whoever shows the model
     device : "cpu" or "cuda"
     seed : of everything random
     """
@@ -42,6 +44,7 @@ class Settings:
     closing: Closing = "pymeshlab"
     parts: Parts = "network"
     textures: Textures = "network"
+    contours: Contours = "keep"
     device: str = "cpu"
     seed: int = 0
 
@@ -52,7 +55,7 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "text
 FIRST_USE = {
     "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
-    "textures": "unwrap",
+    "textures": "unwrap", "contours": "textures",
 }  # fmt: skip
 """Setting → the first stage that it changes."""
 

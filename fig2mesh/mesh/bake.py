@@ -19,11 +19,6 @@ from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
 
-GRAZING = 0.0
-"""Least z of the smooth normal of a point that the viewer may see. The smooth normal decides and not the triangle's, so
-that the border between seen and unseen runs evenly across triangles. What is drawn at the rim, a contour above all, is
-drawn out along the side: at -0.1 fronts come nearer to the drawing by 0.3 dB or so, and sides have broader stripes."""
-
 TURNED = -0.3
 """Triangles turned away further than this are not seen whatever their smooth normal says."""
 
@@ -71,7 +66,7 @@ def bake(
     corners = mesh.solid.vertices[mesh.solid.faces].astype(np.float64)
     points = np.einsum("nk,nkd->nd", weights[covered], corners[face])
     normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
-    seen = _seen(mesh.solid, face, points, normal)
+    seen = _seen(mesh.solid, face, points, normal, sources.grazing)
     pixels = frame.image_from_figure(points)
     color = np.empty((len(face), 3))
     color[seen] = _bilinear(sources.seen, pixels[seen])
@@ -111,16 +106,23 @@ _LOOKS = np.array([
 
 
 def _seen(
-    mesh: Mesh, face: NDArray[np.integer], points: NDArray[np.float64], smooth: NDArray[np.float64]
+    mesh: Mesh,
+    face: NDArray[np.integer],
+    points: NDArray[np.float64],
+    smooth: NDArray[np.float64],
+    grazing: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """(N,) bool: points (with their smooth normals) that the viewer of the drawing, far away along +z, sees."""
+    """(N,) bool: points (with their smooth normals) that the viewer of the drawing, far away along +z, sees.
+
+    grazing : least z of the smooth normal
+    """
     import open3d as o3d
 
     vertices, faces = mesh.vertices, mesh.faces
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
     flat = np.cross(b - a, c - a)
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)
-    seen = (smooth[:, 2] > GRAZING) & (flat[face, 2] > TURNED)
+    seen = (smooth[:, 2] > grazing) & (flat[face, 2] > TURNED)
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
     start = points[seen] + CLEARANCE * flat[face[seen]]

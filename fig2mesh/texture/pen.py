@@ -24,6 +24,12 @@ REACH: Final = 1.5
 ALIKE: Final = 60.0
 """Colours nearer to each other than this (RGB 0-255) are shades of one thing, or the pen's own colour in a wash."""
 
+BAND: Final = 1.8
+"""The line along the silhouette lies within this many widths of it."""
+
+INKY: Final = 110.0
+"""Colours nearer to the pen's than this (RGB 0-255) are its line, soft edges included."""
+
 LEAST_BORDER: Final = 12
 """Pixels; shorter borders tell nothing."""
 
@@ -61,6 +67,24 @@ def find_pen(
         return None
     most = inks[int(np.argmax([(index[strokes] == ink).sum() for ink in inks]))]
     return Pen(palette[most], width, near)
+
+
+def without_contour(
+    picture: NDArray[np.float32], own: NDArray[np.bool_], pen: Pen, width: float
+) -> NDArray[np.float32]:
+    """A picture (H, W, 3) with the line along the silhouette in the colours further in.
+
+    own : (H, W) bool, the silhouette; width : of the line in pixels of the picture
+    """
+    within = ndimage.distance_transform_edt(own) <= BAND * width
+    inky = np.linalg.norm(picture - pen.colour, axis=-1) < INKY
+    # Where the line ends it is mixed with what is beside it.
+    line = within & ndimage.binary_dilation(inky & within, iterations=max(1, round(width / 4)))
+    away, source = ndimage.distance_transform_edt(line | ~own, return_indices=True)
+    # Clothes as dark as ink go on further in, and stay.
+    line &= away <= 1.5 * BAND * width
+    near = ndimage.distance_transform_edt(~line) <= BAND * width
+    return np.where(((line | ~own) & near)[..., None], picture[tuple(source)], picture)
 
 
 def reinked(

@@ -17,8 +17,10 @@ from scipy.cluster.vq import kmeans2
 
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.parts.outline import Outline
-from fig2mesh.records import JOINT, PART, Figure
-from fig2mesh.texture.pen import DARK, STROKE, Pen, find_pen, reinked
+from fig2mesh.records import PART, Figure
+from fig2mesh.texture.heads import back_of_head, drawn_face
+from fig2mesh.texture.patterns import patterned
+from fig2mesh.texture.pen import DARK, Pen, find_pen, reinked, without_contour
 from fig2mesh.texture.votes import Unseen, voted
 
 CUT_OUT = 64
@@ -42,14 +44,12 @@ LINE_WIDTH = 0.014
 PLAIN_SHARE = 0.625
 """Longest side of the plain pictures relative to the texture's: what the texture could show of them."""
 
-FACE_SHARE = 1.05
-"""Half width of the face relative to the head's."""
+GRAZING = 0.0
+"""A contour at the rim is drawn out along the side: at -0.1 fronts come nearer to the drawing by 0.3 dB or so, and
+sides have broader stripes; at 0.15 fronts lose 2 to 9 dB."""
 
-LEAST_HAIR = 0.04
-"""Share of the head that hair or hat must have to be carried on over its back."""
-
-HAIRLINE = 0.55
-"""Height of the hairline above the eyes relative to the head's half width."""
+GRAZING_BARE = 0.3
+"""The same without the contour: nothing is lost, and what is left of its soft edge is not drawn out."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +60,15 @@ class Sources:
     plain : part label → (h, w, 3) float32, the colours that part has on its unseen sides
     plain_scale : IMAGE pixels → pixels of the plain pictures
     pen : of the drawing, its width in FIGURE units; None where it has no contours
+    grazing : least z of the smooth normal of a point that the drawing colours. The smooth normal decides and not the
+        triangle's, so that the border between seen and unseen runs evenly across triangles
     """
 
     seen: NDArray[np.float32]
     plain: dict[int, NDArray[np.float32]]
     plain_scale: float
     pen: Pen | None = None
+    grazing: float = GRAZING
 
 
 def make_sources(
@@ -75,10 +78,12 @@ def make_sources(
     texture_size: int,
     seed: int,
     ask: Callable[[NDArray[np.float32]], Unseen] | None = None,
+    contours: bool = True,
 ) -> Sources:
     """The drawing and its plain version for each part of `outline`.
 
     ask : what networks tell of the unseen sides, given the picture with its colours continued
+    contours : keep the line along the silhouette
     """
     seen = continued(figure.rgba, figure.mask)
     # A whole factor is the same in both directions, so that one number maps pixels.
@@ -94,7 +99,7 @@ def make_sources(
     pen = find_pen(palette, index, ink, labels > 0)
 
     unseen = None if ask is None else ask(seen)
-    face, radius = _face(figure, frame, outline, points)
+    face, radius = drawn_face(figure, frame, outline, points)
     plain: dict[int, NDArray[np.float32]] = {}
     for surface in outline.layers:
         parts = [int(part) for part in np.unique(surface.labels[surface.labels > 0])]
@@ -104,7 +109,8 @@ def make_sources(
         kind = _dominant(index, own, ink, WINDOW / pitch)
         if PART["head"] in parts:
             # Networks tell worst where on a head they are: half of their errors are there.
-            areas = _without_face(kind, labels == PART["head"], face, index, ink, 0.5 * radius / pitch)
+            line, reach = LINE_WIDTH / pitch, 0.5 * radius / pitch
+            areas = back_of_head(kind, labels == PART["head"], face, palette, index, ink, line, reach)
             plain[PART["head"]] = reinked(palette, areas, own, pen)
             parts.remove(PART["head"])
         if parts and unseen is not None:
@@ -115,9 +121,13 @@ def make_sources(
             )
             kind = voted(kind, pixels, named)
         if parts:
-            plain |= dict.fromkeys(parts, reinked(palette, kind, own, pen))
+            drawn = patterned(index, kind, own, WINDOW / pitch)[..., None]
+            plain |= dict.fromkeys(parts, np.where(drawn, small, reinked(palette, kind, own, pen)))
+    grazing = GRAZING
+    if pen is not None and not contours:
+        seen, grazing = without_contour(seen, figure.mask, pen, pen.width * factor), GRAZING_BARE
     pen = None if pen is None else replace(pen, width=pen.width * pitch)
-    return Sources(seen, plain, 1.0 / factor, pen)
+    return Sources(seen, plain, 1.0 / factor, pen, grazing)
 
 
 def continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -221,48 +231,3 @@ def _dominant(
         reliable = own
     _, source = ndimage.distance_transform_edt(~reliable, return_indices=True)
     return np.asarray(chosen[tuple(source)])
-
-
-def _without_face(
-    kind: NDArray[np.int_],
-    head: NDArray[np.bool_],
-    face: NDArray[np.bool_],
-    index: NDArray[np.int_],
-    weight: NDArray[np.float64],
-    radius: float,
-) -> NDArray[np.int_]:
-    """The areas of the head with the face replaced by what surrounds it (hair, hat), as long as that is not skin."""
-    face = face & head
-    around = head & ~face
-    if not face.any() or not around.any():
-        return kind
-    skin = int(np.argmax(np.bincount(index[face], minlength=len(weight)) * weight))
-    hair = around & (index != skin) & (weight[index] > STROKE)
-    if hair.sum() < LEAST_HAIR * head.sum():
-        hair = around
-    return np.where(face, _dominant(index, hair, weight, radius), kind)
-
-
-def _face(
-    figure: Figure, frame: ImageFrame, outline: Outline, points: NDArray[np.float64]
-) -> tuple[NDArray[np.bool_], float]:
-    """(h, w) bool: where the drawing shows a face from the front, and the head's half width, FIGURE units.
-
-    Profiles and faceless heads have none to hide.
-    """
-    eyes, head, neck = (frame.figure_from_image(figure.joints_px[JOINT[n]]) for n in ("eyes", "head", "neck"))
-    none = np.zeros(points.shape[:-1], bool)
-    radius = -float(outline.canvas.sample(outline.canvas.sdf, head[None])[0])
-    if not figure.visible[JOINT["eyes"]] or radius <= 0:
-        return none, 0.0
-    up = head - neck
-    up = up / max(float(np.linalg.norm(up)), 1e-9)
-    aside = abs(float(np.array([up[1], -up[0]]) @ (eyes - head)))
-    if aside > 0.6 * radius:
-        return none, 0.0
-    # From the chin to a hairline half a head above the eyes; below the eyes as wide as the head.
-    offset = points - eyes
-    along, across = offset @ up, (points - head) @ np.array([up[1], -up[0]])
-    rise = np.maximum(along, 0.0) / (HAIRLINE * radius)
-    face = (rise**2 + (across / (FACE_SHARE * radius)) ** 2 < 1.0) & (along > -2.0 * radius)
-    return np.asarray(face), radius

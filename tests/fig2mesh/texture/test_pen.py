@@ -8,7 +8,7 @@ import pytest
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
 from fig2mesh.mesh.bake import crease_ink
-from fig2mesh.texture.pen import Pen, find_pen, reinked
+from fig2mesh.texture.pen import Pen, find_pen, reinked, without_contour
 
 PALETTE = np.array([[250, 250, 250], [200, 40, 40], [40, 200, 60], [10, 10, 10], [215, 60, 50]], np.float32)
 WHITE, RED, GREEN, INK, PINK = range(5)
@@ -86,3 +86,31 @@ def test_corners_between_limbs_are_inked_and_round_limbs_are_not() -> None:
     assert crease_ink(body, corner[None] + [[0, 0.004, 0]], normal, 0.03)[0] > 0.9
     assert crease_ink(body, far, normal, 0.03)[0] == 0
     assert crease_ink(Body((trunk,)), corner[None], normal, 0.03)[0] == 0
+
+
+def _ringed(fill: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray, Pen]:
+    """A disc of one colour with a contour of six pixels and a line across, on white."""
+    y, x = np.mgrid[:120, :120] - 60.0
+    away = np.hypot(x, y)
+    picture = np.full((120, 120, 3), 255, np.float32)
+    picture[away < 50] = fill
+    picture[(away < 50) & ((away > 44) | ((abs(y) < 3) & (away < 30)))] = 10
+    return picture, away < 50, Pen(np.float32([10, 10, 10]), 6.0, away < 50)
+
+
+def test_the_contour_goes_and_lines_inside_stay() -> None:
+    picture, own, pen = _ringed((200, 60, 60))
+    bare = without_contour(picture, own, pen, pen.width)
+    y, x = np.mgrid[:120, :120] - 60.0
+    rim = own & (np.hypot(x, y) > 38)
+    assert (bare[rim] == (200, 60, 60)).all()
+    inside = np.hypot(x, y) < 36
+    assert (bare[inside] == picture[inside]).all()
+    # Beyond the silhouette there is no ink to be mixed in either.
+    assert (bare[60, 111] == (200, 60, 60)).all()
+
+
+def test_clothes_as_dark_as_ink_stay() -> None:
+    picture, own, pen = _ringed((20, 20, 20))
+    bare = without_contour(picture, own, pen, pen.width)
+    assert (np.abs(bare[own] - picture[own]) <= 10).all()
