@@ -7,7 +7,7 @@ them. Shapes, labels and depths are the true ones, so that textures alone are me
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -21,23 +21,38 @@ from fig2mesh.nets.head_hsv import head_path, read_head
 from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
 from fig2mesh.nets.view_refine import read_refine, refine_path
 from fig2mesh.paper import UV_SCORES
-from fig2mesh.records import JOINT, PART, Pose3D
-from fig2mesh.texture.sides import Sides, body_labels
-from fig2mesh.texture.space import inwards, spread
+from fig2mesh.records import PART
+from fig2mesh.texture.space import spread
 from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
-from fig2mesh.training.build import read_shard, shards
+from fig2mesh.training.as_baked import baked_sides
 from fig2mesh.training.evaluate import SPLIT_TITLE, SPLITS, table
-from fig2mesh.training.texture_data import Drawings, load_drawings
+from fig2mesh.training.texture_data import load_drawings
+from fig2mesh.training.textured_subject import Subject, subjects
 from fig2mesh.training.train_uv import scores
-from fig2mesh.training.unfold import carried_on, places
 
 Picture = NDArray[np.float32]
 Say = Callable[[str], None]
 
-ROADS: Final = (
-    "coordinates, refined, heads", "coordinates, refined", "coordinates",
+BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
+    "as the main job bakes them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
+    "coordinates, refined", "coordinates",
+)  # fmt: skip
+STRAIGHT, NEAREST, INPAINTED = (
     "straight through the body", "nearest seen point", "OpenCV inpainting in texture space",
 )  # fmt: skip
+ROADS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
+"""Ways to make unseen sides; the last three are baselines."""
+
+PLACED: Final = (BAKED, DRAWN, COORDINATES, STRAIGHT)
+"""Ways that know where in the drawing each colour is from."""
+
+NEEDS_REFINER: Final = (DRAWN, HEADS, REFINED)
+
+COLOUR_WEIGHT: Final = 1.0
+"""Half pictures of distance that a difference between black and white is worth, in looking for a drawn colour."""
+
+UNCHANGED, UNLIKE = 30.0, 40.0
+"""Largest difference of a channel (0-255) between colours that are the same, and least between those that are not."""
 
 TEXTURE: Final = 256
 """Texels of an edge for inpainting colours."""
@@ -45,93 +60,49 @@ TEXTURE: Final = 256
 PALETTE: Final = 400
 """Pixels of each picture whose colours are compared as palettes."""
 
-FACE_WIDTH, FACE_UP, FACE_DOWN = 0.9, 0.35, 1.2
-"""Half axes of the drawn features about the eyes, relative to the distance of the eyes from the head's middle."""
 
+def painted(subject: Subject, road: str, nets: TextureNets) -> tuple[Picture, Picture]:
+    """The sides as one way to make them has them, from the front picture alone.
 
-@dataclass(frozen=True)
-class Subject:
-    """One body of `Drawings` as if it were traced, and its front picture.
-
-    sides : see `Sides`; FIGURE x, y relative to the middle of the front
-    front : (H, W, 3) float32, 0-255, colours carried on beyond the silhouette
-    truth : (4, H, W, 3) float32, 0-255
-    face : (H, W) bool, where the front has eyes and mouth
+    Returns
+    -------
+    (4, H, W, 3) colours, 0-255; (4, H, W, 2) where in the front each is from, as far as that is known, edges at -1, 1
     """
-
-    sides: Sides
-    front: Picture
-    truth: Picture
-    face: NDArray[np.bool_]
-
-
-def subjects(data: Path, split: str, most: int) -> list[Subject]:
-    """The first bodies of a split that have texture coordinates."""
-    drawings = load_drawings(data, (split,), pictures=True, most=most)
-    joints: list[NDArray[np.float32]] = []
-    for path in shards(data, split):
-        arrays = read_shard(path, ("joints", "uv"))
-        joints += list(arrays["joints"][arrays["uv"].any(axis=(1, 2, 3, 4))])
-    return [_subject(drawings, row, joints[row].astype(np.float32)) for row in range(len(drawings))]
-
-
-def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subject:
-    labels, depth = drawings.labels[row], drawings.depth[row].astype(np.float32)
-    place = places(labels, depth)
-    size = labels.shape[1]
-    columns = np.flatnonzero((labels[0] > 0).any(axis=0))
-    left, right = float(depth[1][labels[1] > 0].max()), -float(depth[3][labels[3] > 0].max())
-    pitch = (left - right) / (columns[-1] - columns[0] + 1)
-    half = pitch * size / 2
-    # Depth of front and back; those of left and right follow from their columns.
-    along = (np.arange(size) + 0.5 - size / 2) * pitch
-    near = depth[0][labels[0] > 0]
-    far = -depth[2][labels[2] > 0]
-    middle = (float(near.max()) + float(far.min())) / 2
-    z = np.stack([depth[0], np.broadcast_to(middle - along, depth[1].shape), -depth[2],
-                  np.broadcast_to(middle + along, depth[3].shape)])  # fmt: skip
-    seen = labels > 0
-    points = np.concatenate([place * [half, -half], z[..., None]], axis=-1)
-    points = np.where(seen[..., None], points, 0.0).astype(np.float32)
-    picture = drawings.picture[row].astype(np.float32)
-    # Joints are relative to the pelvis, pictures to the middle of the figure's box.
-    middle_x = (left + right) / 2
-    head, eyes = (joints[JOINT[name]] for name in ("head", "eyes"))
-    top = float(joints[:, 1].max())
-    own = labels[0] == PART["head"]
-    rows = np.flatnonzero(own.any(axis=1))
-    face = np.zeros((size, size), bool)
-    reach = float(np.linalg.norm(eyes - head))
-    if len(rows) and eyes[2] - head[2] > 0.15 * reach:
-        # The head joint is the middle of the skull: it ties the joints' heights to the picture's.
-        centre = np.argwhere(own).mean(axis=0)
-        column = (eyes[0] - middle_x) / pitch + size / 2
-        line = centre[0] - (eyes[1] - head[1]) / pitch
-        y, x = np.mgrid[:size, :size] + 0.5
-        across = (x - column) / (FACE_WIDTH * reach / pitch)
-        up = (line - y) * pitch / reach
-        face = (across**2 + np.where(up > 0, up / FACE_UP, up / FACE_DOWN) ** 2 < 1) & own
-    pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * 0.9], joints[:, 2:]], axis=1))
-    sides = Sides(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
-    return Subject(sides, carried_on(picture[0], inwards(seen[0])), picture, face)
-
-
-def painted(subject: Subject, road: str, nets: TextureNets) -> Picture:
-    """(4, H, W, 3) the sides as one way to make them has them, from the front picture alone."""
     sides, front = subject.sides, subject.front
     seen = sides.labels > 0
-    if road in ROADS[:3]:
-        given = (nets, replace(nets, head=None), replace(nets, refine=None, head=None))[ROADS.index(road)]
-        return paint(sides, front, given)
-    if road == ROADS[3]:
-        return _sampled(front, sides.places())
-    if road == ROADS[4]:
+    straight = sides.places()
+    if road in (HEADS, REFINED):
+        return paint(sides, front, nets if road == HEADS else replace(nets, head=None)), straight
+    if road == STRAIGHT:
+        return _sampled(front, straight), straight
+    if road == NEAREST:
         source = sides.points[0][seen[0]]
         _, index = cKDTree(source).query(sides.points[seen])
         result = np.zeros((*seen.shape, 3), np.float32)
         result[seen] = front[seen[0]][index]
-        return result
-    return _inpainted(subject, nets)
+        return result, straight
+    if road == INPAINTED:
+        return _inpainted(subject, nets), straight
+    found = straight + unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    if road == COORDINATES:
+        return _sampled(front, found), found
+    if road == BAKED:
+        return baked_sides(subject, found), straight
+    return _in_drawn_colours(paint(sides, front, replace(nets, head=None)), found, front, seen)
+
+
+def _in_drawn_colours(
+    made: Picture, place: Picture, front: Picture, seen: NDArray[np.bool_]
+) -> tuple[Picture, Picture]:
+    """Colours replaced by those of drawn pixels that are most like them and near to where they were looked for."""
+    size = front.shape[0]
+    rows, columns = np.nonzero(seen[0])
+    at = np.stack([columns + 0.5, rows + 0.5], axis=1) / size * 2 - 1
+    tree = cKDTree(np.concatenate([COLOUR_WEIGHT * front[seen[0]] / 255, at], axis=1))
+    _, index = tree.query(np.concatenate([COLOUR_WEIGHT * made[seen] / 255, place[seen]], axis=1))
+    result, where = np.zeros_like(made), place.copy()
+    result[seen], where[seen] = front[seen[0]][index], at[index]
+    return result, where
 
 
 def _sampled(front: Picture, place: NDArray[np.floating]) -> Picture:
@@ -175,14 +146,22 @@ def compare(made: Picture, truth: Picture, mask: NDArray[np.bool_]) -> tuple[flo
     return float(psnr), float(similar[mask].mean()), float(apart) / 2
 
 
-def face_share(made_place: NDArray[np.floating], subject: Subject) -> float:
-    """Share of the head's pixels, seen from behind, that take their colour from the drawn eyes, nose and mouth."""
+def face_share(made: Picture, place: Picture, subject: Subject) -> tuple[float, float]:
+    """Shares of the head's pixels, seen from behind, that show what the drawing has in the face, and of those among
+    them where the truth is another colour.
+
+    place : where in the front the colours `made` are from, see `painted`
+    """
     back = subject.sides.labels[2] == PART["head"]
     if not back.any() or not subject.face.any():
-        return float("nan")
+        return float("nan"), float("nan")
     size = back.shape[0]
-    pixel = np.clip(((made_place[2][back] + 1) / 2 * size).astype(int), 0, size - 1)
-    return float(subject.face[pixel[:, 1], pixel[:, 0]].mean())
+    pixel = np.clip(((place[2][back] + 1) / 2 * size).astype(int), 0, size - 1)
+    column, row = pixel[:, 0], pixel[:, 1]
+    alike = np.abs(made[2][back] - subject.front[row, column]).max(axis=1) < UNCHANGED
+    shown = subject.face[row, column] & alike
+    wrong = np.abs(made[2][back] - subject.truth[2][back]).max(axis=1) > UNLIKE
+    return float(shown.mean()), float((shown & wrong).mean())
 
 
 def evaluate_textures(data: Path, runs: Path | None, bodies: int, say: Say = lambda line: None) -> str:
@@ -232,37 +211,33 @@ def _networks(runs: Path | None) -> TextureNets:
 
 
 def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
-    missing = {ROADS[0]: nets.head is None or nets.refine is None, ROADS[1]: nets.refine is None}
-    roads = [road for road in ROADS if not missing.get(road)]
+    absent = {HEADS} if nets.head is None else set()
+    absent |= set(NEEDS_REFINER) if nets.refine is None else set()
+    roads = [road for road in ROADS if road not in absent]
     rows, faces = [], []
     for split in SPLITS:
         chosen = subjects(data, split, bodies)
         for road in roads:
-            cells = []
             found: dict[str, list[tuple[float, float, float]]] = {"back": [], "sides": []}
-            for subject in chosen:
-                made = painted(subject, road, nets)
-                for view in (1, 2, 3):
-                    mask = subject.sides.labels[view] > 0
-                    key = "back" if view == 2 else "sides"
-                    found[key].append(compare(made[view], subject.truth[view], mask))
-            for values in found.values():
-                means = np.mean(values, axis=0)
-                cells += [f"{means[0]:.2f}", f"{means[1]:.3f}", f"{means[2]:.2f}"]
-            rows.append((f"{SPLIT_TITLE[split]}: {road}", *cells))
-        for road in ROADS[2:4]:
             shares = []
             for subject in chosen:
-                place = subject.sides.places()
-                if road == ROADS[2]:
-                    uv = texture_coordinates(subject.sides, nets.uv)
-                    place = place + unseen_changes(subject.sides, subject.front, uv, nets.fill)
-                shares.append(face_share(place, subject))
-            faces.append((f"{SPLIT_TITLE[split]}: {road}", f"{100 * float(np.nanmean(shares)):.2f}"))
+                made, place = painted(subject, road, nets)
+                shares.append(face_share(made, place, subject))
+                for view in (1, 2, 3):
+                    mask = subject.sides.labels[view] > 0
+                    found["back" if view == 2 else "sides"].append(compare(made[view], subject.truth[view], mask))
+            means = [np.mean(values, axis=0) for values in found.values()]
+            title = f"{SPLIT_TITLE[split]}: {road}"
+            rows.append((title, *(cell for m in means for cell in (f"{m[0]:.2f}", f"{m[1]:.3f}", f"{m[2]:.2f}"))))
+            if road in PLACED:
+                faces.append((title, *(f"{100 * share:.1f}" for share in np.nanmean(shares, axis=0))))
     head = ["way", *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette"))]
     text = (
         f"{bodies} bodies a split; means over pictures of 256 x 256 pixels, inside of the body. Palette: mean distance "
         "to the nearest colour of the other picture, CIELAB units, both ways."
     )
-    share = "Share of the back of heads that shows eyes, nose or mouth:"
-    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('way', 'percent'), faces)}"
+    share = (
+        "Percent of the back of heads that shows what the drawing has between brows and chin, skin included; and as far "
+        "as the truth has another colour there:"
+    )
+    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('way', 'face', 'face, wrongly'), faces)}"

@@ -42,27 +42,34 @@ class Unfolded:
         return len(self.part)
 
 
+def front_scale(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> tuple[float, float]:
+    """Units of depth that a pixel of the front picture is wide, and the x in its middle.
+
+    Depths from left and right tell how wide the front is. labels, depth : (4, H, W)
+    """
+    columns = np.flatnonzero((labels[0] > 0).any(axis=0))
+    left, right = (sign * float(np.asarray(depth[view], np.float64)[labels[view] > 0].max())
+                   for view, sign in ((1, 1), (3, -1)))  # fmt: skip
+    return (left - right) / (columns[-1] - columns[0] + 1), (left + right) / 2
+
+
 def places(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> NDArray[np.float32]:
     """(4, H, W, 2) x, y in the front picture of what each pixel of the four sides (4, H, W) shows, edges at -1 and 1.
 
-    Every side is framed about the middle of its own box, so the box's height tells the sides' scales apart, and the
-    depths from left and right tell how wide the front is.
+    Every side is framed about the middle of its own box, so the box's height tells the sides' scales apart.
     """
     size = labels.shape[1]
-    boxes = []
+    heights = []
     for view in range(4):
-        rows, columns = (np.flatnonzero((labels[view] > 0).any(axis=axis)) for axis in (1, 0))
-        boxes.append((rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1))
-    finite = [np.asarray(depth[view], np.float64)[labels[view] > 0] for view in range(4)]
-    left, right = float(finite[1].max()), -float(finite[3].max())
-    pitch = (left - right) / boxes[0][1]
-    middle = (left + right) / 2
+        rows = np.flatnonzero((labels[view] > 0).any(axis=1))
+        heights.append(rows[-1] - rows[0] + 1)
+    pitch, middle = front_scale(labels, depth)
     along = (np.arange(size) + 0.5) / size * 2 - 1
     result = np.zeros((*labels.shape, 2), np.float32)
     for view in range(4):
-        result[view, ..., 1] = along[:, None] * (boxes[0][0] / boxes[view][0])
+        result[view, ..., 1] = along[:, None] * (heights[0] / heights[view])
     result[0, ..., 0] = along
-    result[2, ..., 0] = -along * (boxes[0][0] / boxes[2][0])
+    result[2, ..., 0] = -along * (heights[0] / heights[2])
     for view, sign in ((1, 1.0), (3, -1.0)):
         x = sign * np.where(labels[view] > 0, np.asarray(depth[view], np.float64), 0.0)
         result[view, ..., 0] = 2 * (x - middle) / (pitch * size)

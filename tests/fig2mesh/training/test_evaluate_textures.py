@@ -13,8 +13,9 @@ from fig2mesh.nets.texture_fill import FillShape, TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
 from fig2mesh.texture.unseen import TextureNets
-from fig2mesh.training.evaluate_textures import ROADS, Subject, compare, face_share, painted, subjects
+from fig2mesh.training.evaluate_textures import COORDINATES, PLACED, ROADS, STRAIGHT, compare, face_share, painted
 from fig2mesh.training.loop import seeded
+from fig2mesh.training.textured_subject import Subject, subjects
 from tests.fig2mesh.training.ellipsoids import BACK, FRONT, write_shards
 
 
@@ -47,7 +48,7 @@ def test_points_lie_on_the_ellipsoid(subject: Subject) -> None:
 @pytest.mark.parametrize("road", ROADS)
 def test_every_way_paints_every_side(subject: Subject, untrained: TextureNets, road: str) -> None:
     pytest.importorskip("cv2")
-    made = painted(subject, road, untrained)
+    made, _place = painted(subject, road, untrained)
     seen = subject.sides.labels > 0
     assert made.shape == subject.truth.shape
     assert np.isfinite(made[seen]).all()
@@ -56,8 +57,20 @@ def test_every_way_paints_every_side(subject: Subject, untrained: TextureNets, r
 
 
 def test_straight_through_is_the_mirrored_front(subject: Subject, untrained: TextureNets) -> None:
-    made = painted(subject, "straight through the body", untrained)
-    np.testing.assert_array_equal(made, painted(subject, "coordinates", untrained))
+    made, place = painted(subject, STRAIGHT, untrained)
+    same, found = painted(subject, COORDINATES, untrained)
+    np.testing.assert_array_equal(made, same)
+    np.testing.assert_array_equal(place, found)
+
+
+@pytest.mark.parametrize("road", PLACED)
+def test_colours_are_from_where_they_are_said_to_be(subject: Subject, untrained: TextureNets, road: str) -> None:
+    made, place = painted(subject, road, untrained)
+    seen = subject.sides.labels > 0
+    size = subject.front.shape[0]
+    pixel = np.clip(((place[seen] + 1) / 2 * size).astype(int), 0, size - 1)
+    off = np.abs(made[seen] - subject.front[pixel[:, 1], pixel[:, 0]]).max(axis=1)
+    assert np.median(off) < 10
 
 
 def test_comparison_of_a_picture_with_itself_and_with_another() -> None:
@@ -84,14 +97,18 @@ def test_what_lies_outside_of_the_body_does_not_count() -> None:
     assert compare(other, truth, mask)[0] == 90.0
 
 
-def test_a_mirrored_front_has_the_face_behind(subject: Subject) -> None:
+def test_a_mirrored_front_has_the_face_behind(subject: Subject, untrained: TextureNets) -> None:
     place = subject.sides.places()
     assert subject.face.any()
     head = subject.sides.labels[0] == 2
     expected = subject.face.sum() / head.sum()
-    assert face_share(place, subject) == pytest.approx(expected, abs=0.1)
-    assert face_share(place * 0 - 0.99, subject) == 0
-    assert np.isnan(face_share(place, replace(subject, face=np.zeros_like(subject.face))))
+    made, _place = painted(subject, STRAIGHT, untrained)
+    shown, wrong = face_share(made, place, subject)
+    assert shown == pytest.approx(expected, abs=0.1)
+    assert wrong == pytest.approx(shown), "the truth is blue behind"
+    assert face_share(subject.truth, place, subject) == (0, 0)
+    assert face_share(made, place * 0 - 0.99, subject) == (0, 0)
+    assert np.isnan(face_share(made, place, replace(subject, face=np.zeros_like(subject.face)))).all()
 
 
 def test_truth_has_another_colour_behind(subject: Subject) -> None:
