@@ -237,7 +237,7 @@ def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
         "to the nearest colour of the other picture, CIELAB units, both ways."
     )
     share = (
-        "Percent of the back of heads that shows what the drawing has between brows and chin, skin included; and as far "
-        "as the truth has another colour there:"
+        "Percent of the back of heads that shows what the drawing has between brows and chin, skin included; and as far"
+        " as the truth has another colour there:"
     )
     return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('way', 'face', 'face, wrongly'), faces)}"
