@@ -68,7 +68,7 @@ class TexturedMesh:
 
     vertices : (V, 3) float32, ASSET, metres
     faces : (F, 3) int32, counter-clockwise seen from outside
-    normals : (V, 3) float32, unit length
+    normals : (V, 3) float32, unit length; None: nothing is to be lit
     uv : (V, 2) float32 in [0, 1], v = 0 at image row 0 (the glTF convention); None: untextured
     texture : colours; None: untextured
     observed : one-channel texture, 255 where the drawing itself showed the surface, 0 where it is inferred
@@ -81,7 +81,7 @@ class TexturedMesh:
 
     vertices: FloatArray
     faces: IntArray
-    normals: FloatArray
+    normals: FloatArray | None
     solid_index: IntArray
     uv: FloatArray | None = None
     texture: Texture | None = None
@@ -110,6 +110,19 @@ class TexturedMesh:
             raise ValueError("texture: given without uv coordinates")
 
     @property
+    def shading_normals(self) -> FloatArray:
+        """(V, 3) float32 `normals`, or those of the triangles weighted by area where there are none."""
+        if self.normals is not None:
+            return self.normals
+        corners = self.vertices.astype(np.float64)[self.faces]
+        flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        at_solid = np.zeros((int(self.solid_index.max(initial=-1)) + 1, 3))
+        np.add.at(at_solid, self.solid_faces.reshape(-1), np.repeat(flat, 3, axis=0))
+        length = np.linalg.norm(at_solid, axis=1, keepdims=True)
+        unit = np.where(length > 0, at_solid / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
+        return unit[self.solid_index].astype(np.float32)
+
+    @property
     def solid_faces(self) -> IntArray:
         """(F, 3) int32 faces of the unsplit solid."""
         return self.solid_index[self.faces]
@@ -124,6 +137,7 @@ class Asset:
     placement : where it stands; None: nowhere (local use)
     part_names : label → name for the labels that occur in `TexturedMesh.parts`
     copyright : attribution line, may be empty
+    lit : whether clients light the surface or show its colours as they are (formats that know the difference)
     metadata : JSON-serialisable facts about the figure (source, seed, version, observed share ...)
     """
 
@@ -132,6 +146,7 @@ class Asset:
     placement: GeoPlacement | None = None
     part_names: dict[int, str] = field(default_factory=dict)
     copyright: str = ""
+    lit: bool = False
     metadata: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -170,8 +170,9 @@ def _build(asset: Asset, lod: int) -> _Document:
     attributes = {
         # tolist() of float32 gives the very doubles that a reader gets from the buffer.
         "POSITION": document.accessor("position", mesh.vertices, ARRAY_BUFFER, min=low.tolist(), max=high.tolist()),
-        "NORMAL": document.accessor("normal", unit_normals(mesh.normals), ARRAY_BUFFER),
     }
+    if mesh.normals is not None:
+        attributes["NORMAL"] = document.accessor("normal", unit_normals(mesh.normals), ARRAY_BUFFER)
     if mesh.uv is not None:
         attributes["TEXCOORD_0"] = document.accessor("texcoord", mesh.uv, ARRAY_BUFFER)
     if mesh.texture is None and mesh.colors is not None:
@@ -179,7 +180,7 @@ def _build(asset: Asset, lod: int) -> _Document:
             "color", _linear_rgba(mesh.colors), ARRAY_BUFFER, normalized=True
         )  # fmt: skip
     primitive: dict[str, Any] = {
-        "attributes": attributes, "indices": indices, "material": _material(document, mesh), "mode": 4,
+        "attributes": attributes, "indices": indices, "material": _material(document, mesh, asset.lit), "mode": 4,
     }  # fmt: skip
     if mesh.parts is not None:
         primitive["extensions"] = {"EXT_mesh_features": _features(document, asset, mesh, attributes)}
@@ -191,7 +192,7 @@ def _build(asset: Asset, lod: int) -> _Document:
     return document
 
 
-def _material(document: _Document, mesh: TexturedMesh) -> int:
+def _material(document: _Document, mesh: TexturedMesh, lit: bool) -> int:
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
     if mesh.texture is not None:
         document.json["samplers"] = [
@@ -206,9 +207,8 @@ def _material(document: _Document, mesh: TexturedMesh) -> int:
         document.json["textures"] = [{"sampler": 0, "source": 0}]
         surface["baseColorTexture"] = {"index": 0}
     material: dict[str, Any] = {"name": "drawing", "pbrMetallicRoughness": surface}
-    if mesh.texture is not None or mesh.colors is not None:
-        # Unlit: a drawing brings its own light and shade. The fields beside it are what viewers without unlit show.
-        # A figure without colours would be a white silhouette.
+    if not lit:
+        # A drawing brings its own light and shade. The fields beside it are what viewers without unlit show.
         document.used.add("KHR_materials_unlit")
         material["extensions"] = {"KHR_materials_unlit": {}}
     return document.add("materials", material)

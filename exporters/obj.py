@@ -52,7 +52,7 @@ def write_obj(asset: Asset, path: Path | str) -> None:
     else:
         corners = corners[:, :, [0, 2]]
         template = "f %d//%d %d//%d %d//%d"
-    blocks.append(_rows("vn", unit_normals(mesh.normals)))
+    blocks.append(_rows("vn", unit_normals(mesh.shading_normals)))
     if mesh.texture is not None:
         blocks.append("usemtl drawing")
         texture = path.with_name(f"{path.stem}_texture.png")

@@ -35,7 +35,7 @@ def write_ply(asset: Asset, path: Path | str) -> None:
         columns = [np.bincount(solid.vertex, weights=column, minlength=count) for column in values.T]
         return np.stack(columns, axis=1) / copies[:, None]
 
-    normals = unit_normals(averaged(mesh.normals).astype(np.float32))
+    normals = unit_normals(averaged(mesh.shading_normals).astype(np.float32))
     blocks: list[tuple[tuple[str, ...], str, str, NDArray[Any]]] = [
         (("x", "y", "z"), "<f4", "float", mesh.vertices[solid.first]),
         (("nx", "ny", "nz"), "<f4", "float", normals),

@@ -147,7 +147,7 @@ def _define_mesh(stage: Any, asset: Asset) -> Any:
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(solid.faces), 3, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(solid.faces.reshape(-1)))
 
-    normals = unit_normals(source.normals)
+    normals = unit_normals(source.shading_normals)
     if np.linalg.norm(normals - normals[solid.first[solid.vertex]], axis=1).max() < NORMAL_TOLERANCE:
         mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals[solid.first]))
         mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)

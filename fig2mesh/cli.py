@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
 from fig2mesh import __version__
+from fig2mesh.settings import EFFECTS
 from fig2mesh.training import cli as training_cli
 from fig2mesh.training import data_cli
 
@@ -101,6 +103,10 @@ def cli() -> None:
     help="The line drawn around the figure: on the surface, like the drawing from the front and a dark band from the "
     "side; or left away, for clients that draw silhouettes.",
 )  # fmt: skip
+@click.option(
+    "--effect", "effects", type=click.Choice(EFFECTS), multiple=True,
+    help="light: clients light the surface (default without texture); none: they show it as it is. Repeatable.",
+)  # fmt: skip
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
@@ -121,6 +127,19 @@ def make(**options: Any) -> None:
     from fig2mesh.job import run
 
     run(**options)
+
+
+@cli.command("plan", params=[*make.params, click.Option(["--json", "as_json"], is_flag=True, help="One JSON object.")])
+def show_plan(as_json: bool, **options: Any) -> None:
+    """Print which stages and effects a request needs, and why; the options are those of the main job."""
+    from fig2mesh.job import plan_of
+
+    planned = plan_of(**options)
+    if as_json:
+        click.echo(json.dumps(asdict(planned), indent=2))
+        return
+    for each in (*planned.stages, *planned.effects):
+        click.echo(f"{'run ' if each.runs else 'skip'}  {each.name:<9} {each.why}")
 
 
 @cli.command()

@@ -16,8 +16,10 @@ from typing import Any
 
 from exporters.asset import Asset
 from exporters.write import check_outputs, is_tileset, write
+from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
+from fig2mesh.plan import COLOURING, Plan, plan
 from fig2mesh.records import Figure
 from fig2mesh.report import Timing, make_report
 from fig2mesh.settings import FIRST_USE, STAGES, Settings, settings_for
@@ -29,9 +31,6 @@ log = logging.getLogger("fig2mesh")
 
 REQUEST = "request"
 """Name of the stage file that says what the others were made for."""
-
-COLOURING = ("unwrap", "textures", "bake")
-"""Stages that figures without texture do not need."""
 
 
 def run(
@@ -55,6 +54,7 @@ def run(
     parts: str,
     textures: str | None,
     contours: str,
+    effects: tuple[str, ...],
     mesher: str,
     closing: str,
     device: str,
@@ -86,9 +86,9 @@ def run(
     if lods > 1 and resume_from is None and not any(is_tileset(target) for target in targets):
         log.info("--lods %d: only 3D Tiles have levels of detail; one is made", lods)
         lods = 1
-    settings = settings_for(
-        quality, triangles=triangles, texture_size=texture_size, lods=lods, mesher=mesher, closing=closing,
-        parts=parts, textures=textures, contours=contours, device=_device(device), seed=seed,
+    settings = _settings(
+        quality=quality, triangles=triangles, texture_size=texture_size, lods=lods, parts=parts, textures=textures,
+        contours=contours, effects=effects, mesher=mesher, closing=closing, device=_device(device), seed=seed,
     )  # fmt: skip
     stages = None if save_stages is None else _stages(save_stages, drawn, settings, resume_from)
 
@@ -100,8 +100,9 @@ def run(
     results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
     timings: list[Timing] = []
     written: list[Path] = []
-    with _progress(quiet) as advance:
-        _run_steps(settings, height_m, results, timings, stages, resume_from, advance)
+    planned = plan(settings, targets)
+    with _progress(quiet) as advance, counting() as counts:
+        _run_steps(settings, height_m, results, timings, stages, resume_from, advance, planned)
         found = results["solid"].how
         if found.components != pieces:
             log.warning("%s: %d solids for %d drawn pieces; %s", figure, found.components, pieces, found.note)
@@ -114,17 +115,20 @@ def run(
             placement=placement,
             part_names=_part_names(levels) if evidence else {},
             copyright=credit,
+            lit=settings.light,
             metadata={"source": figure.name, "seed": settings.seed, "quality": quality},
         )
         for target in targets:
             advance(f"write {target}")
             start = time.perf_counter()
             written += write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
-            timings.append(Timing(f"write {target}", time.perf_counter() - start, _peak_mb()))
+            timings.append(Timing(f"write {target}", time.perf_counter() - start, _peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
         facts = make_report(inputs, written, asset, results, settings, height_m)
         facts["stages"] = [timing.as_dict() for timing in timings]
+        facts["effects"] = [{"effect": each.name, "run": each.runs, "why": each.why} for each in planned.effects]
+        facts["counters"] = counts
         _write_text(report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     for target in targets:
         log.info("%s", target)
@@ -138,26 +142,26 @@ def _run_steps(
     folder: Path | None,
     resume_from: str | None,
     advance: Any,
+    planned: Plan,
 ) -> None:
     from fig2mesh.pipeline import steps
     from fig2mesh.stages import load_stage, save_stage
 
-    road = steps(settings, height_m)
+    why = {stage.name: stage.why for stage in planned.stages}
+    normals = any(effect.runs for effect in planned.effects if effect.name == "normals")
+    road = steps(settings, height_m, normals=normals)
     first = 0 if resume_from is None else next(i for i, step in enumerate(road) if step.name == resume_from)
-    if "cloud" not in (step.name for step in road):
-        timings.append(Timing("cloud", 0.0, _peak_mb(), skipped="the isosurface needs no points"))
-    if settings.textures == "none":
-        timings += [Timing(name, 0.0, _peak_mb(), skipped="no texture is asked for") for name in COLOURING]
+    timings += [Timing(each.name, 0.0, _peak_mb(), each.why, runs=False) for each in planned.stages if not each.runs]
     for index, step in enumerate(road):
         advance(step.name)
         start = time.perf_counter()
         if index < first and step.kept:
             assert folder is not None
             results[step.name] = load_stage(folder, step.name)
-            timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb(), skipped="read from stages"))
+            timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb(), "read from stages", runs=False))
             continue
         results[step.name] = step.run(*(results[name] for name in step.needs))
-        timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb()))
+        timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb(), why[step.name]))
         log.debug("%s: %.2f s", step.name, timings[-1].seconds)
         if folder is not None and step.kept:
             save_stage(folder, step.name, results[step.name])
@@ -216,6 +220,26 @@ def _check_targets(
         if placement is None and is_tileset(target):
             raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT")
     check_outputs(targets, overwrite=overwrite, name=name, lods=lods)
+
+
+def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any) -> Plan:
+    """What `run` would do with the same options; reads and writes nothing."""
+    targets = outputs or (figure.stem + ".glb",)
+    levels = lods if any(is_tileset(target) for target in targets) else 1
+    names = ("quality", "triangles", "texture_size", "parts", "textures", "contours", "effects", "mesher", "closing",
+             "seed")  # fmt: skip
+    return plan(_settings(lods=levels, device="cpu", **{name: options[name] for name in names}), targets)
+
+
+def _settings(*, quality: Any, effects: tuple[str, ...], **given: Any) -> Settings:
+    return settings_for(quality, light=_light(effects), **given)
+
+
+def _light(effects: tuple[str, ...]) -> bool | None:
+    """Whether the surface is lit; None where nothing is said."""
+    if "none" in effects and len(set(effects)) > 1:
+        raise InputError("--effect", f"none beside {effects[0]}", "give either none or the effects wanted")
+    return "light" in effects if effects else None
 
 
 def _device(name: str) -> str:

@@ -158,6 +158,6 @@ def turned_normals(mesh: TexturedMesh) -> float:
     """Share of vertices whose shading normal has a negative product with the normal of a triangle they belong to."""
     corners = mesh.vertices.astype(np.float64)[mesh.faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    against = np.einsum("fd,fkd->fk", flat, mesh.normals[mesh.faces].astype(np.float64)) < 0
+    against = np.einsum("fd,fkd->fk", flat, mesh.shading_normals[mesh.faces].astype(np.float64)) < 0
     used: NDArray[Any] = np.unique(mesh.faces)
     return len(np.unique(mesh.faces[against])) / max(len(used), 1)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from exporters.asset import Texture, TexturedMesh
+from fig2mesh.counters import count
 from fig2mesh.field.body import Body
 from fig2mesh.mesh.bake import Baked, bake, drawn_faces
 from fig2mesh.mesh.normals import vertex_normals
@@ -51,8 +52,11 @@ class Step:
     kept: bool = True
 
 
-def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
-    """The verbs that a request needs, in order. The first takes the result "figure", the last makes "model"."""
+def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple[Step, ...]:
+    """The verbs that a request needs, in order. The first takes the result "figure", the last makes "model".
+
+    normals : whether the model has shading normals; textured ones always do
+    """
 
     def lift_pose(figure: Figure) -> Pose3D:
         road = lift if settings.parts == "outline" else lift_by_network
@@ -127,7 +131,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
                 level,
                 vertices=level.vertices[mesh.solid_index],
                 faces=mesh.faces,
-                normals=level.normals[mesh.solid_index],
+                normals=None if level.normals is None else level.normals[mesh.solid_index],
                 solid_index=mesh.solid_index,
                 uv=mesh.uv,
                 texture=Texture(texture.color),
@@ -147,7 +151,7 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
                 TexturedMesh(
                     vertices=asset.apply(mesh.vertices).astype(np.float32),
                     faces=mesh.faces,
-                    normals=vertex_normals(mesh, body),
+                    normals=_shading_normals(mesh, body) if normals else None,
                     solid_index=np.arange(len(mesh.vertices), dtype=np.int32),
                     parts=_labels(body, mesh.vertices),
                     deviation_m=(mean * scale, worst * scale),
@@ -178,6 +182,11 @@ def steps(settings: Settings, height_m: float) -> tuple[Step, ...]:
         Step("simplify", ("solid",), simplify_levels),
         *colouring,
     )
+
+
+def _shading_normals(mesh: Mesh, body: Body) -> FloatArray:
+    count("shading normals", len(mesh.vertices))
+    return vertex_normals(mesh, body)
 
 
 def _texels(settings: Settings, level: int) -> int:

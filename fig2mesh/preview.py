@@ -240,7 +240,7 @@ def _colours(
         return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
     if mode == "textured" and mesh.colors is not None:
         return at(mesh.colors)
-    normals = at(mesh.normals) @ view_from_asset.T
+    normals = at(mesh.shading_normals) @ view_from_asset.T
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     if mode == "normals":
         return 127.5 * (normals + 1.0)

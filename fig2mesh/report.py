@@ -21,20 +21,22 @@ from fig2mesh.settings import Settings
 
 @dataclass(frozen=True)
 class Timing:
-    """seconds of wall clock for one stage; peak_mb: largest resident size of the process until its end, MiB."""
+    """seconds of wall clock for one stage; peak_mb: largest resident size of the process until its end, MiB;
+    why : it was run, or not."""
 
     name: str
     seconds: float
     peak_mb: float
-    skipped: str = ""
+    why: str
+    runs: bool = True
 
     def as_dict(self) -> dict[str, Any]:
         return {
             "stage": self.name,
             "seconds": round(self.seconds, 4),
             "peak_mb": round(self.peak_mb, 1),
-            "run": not self.skipped,
-            "why": self.skipped or "needed for the outputs",
+            "run": self.runs,
+            "why": self.why,
         }
 
 

@@ -29,6 +29,7 @@ class Settings:
     parts : what depths come from: networks, or rules and the outline alone
     textures : of unseen sides: as networks paint them, or plain colours of what is drawn before them; none at all
     contours : of the silhouette, if drawn: kept on the surface, or left to whoever shows the model
+    light : clients light the surface; without, they show its colours as they are
     device : "cpu" or "cuda"
     seed : of everything random
     """
@@ -45,9 +46,13 @@ class Settings:
     parts: Parts = "network"
     textures: Textures = "network"
     contours: Contours = "keep"
+    light: bool = False
     device: str = "cpu"
     seed: int = 0
 
+
+EFFECTS = ("light", "none")
+"""What the main job can be asked for by name; `fig2mesh render` has more."""
 
 STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "textures", "bake", "model")
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
@@ -55,7 +60,7 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "text
 FIRST_USE = {
     "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
-    "textures": "unwrap", "contours": "textures",
+    "textures": "unwrap", "contours": "textures", "light": "model",
 }  # fmt: skip
 """Setting → the first stage that it changes."""
 
@@ -69,9 +74,11 @@ PRESETS: dict[Quality, Settings] = {
 def settings_for(quality: Quality, **changes: object) -> Settings:
     """A preset with the given fields replaced; fields that are None keep the preset's value.
 
-    Who wants parts without networks gets textures without them too, unless told otherwise.
+    Who wants parts without networks gets textures without them too, and a figure without colours is lit, lest it be a
+    white silhouette; unless told otherwise.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     if given.get("parts") == "outline":
         given.setdefault("textures", "plain")
+    given.setdefault("light", given.get("textures") == "none")
     return replace(PRESETS[quality], **given)  # type: ignore[arg-type]

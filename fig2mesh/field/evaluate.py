@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fig2mesh.counters import count
 from fig2mesh.field.compiled import run_blocks, sealed
 from fig2mesh.field.grid_kernels import evaluate_blocks
 from fig2mesh.field.grids import Grids
@@ -26,13 +27,14 @@ def evaluate(
     points = sealed(points, np.float64)
     if points.ndim != 2 or points.shape[1] != 3:
         raise ValueError(f"points: shape is {points.shape}, expected (N, 3)")
-    count = len(points)
-    values = np.full(count, np.inf)
-    parts = np.full(count if with_parts else 0, -1, np.int32)
-    gradients = np.zeros((count if with_gradients else 0, 3))
+    number = len(points)
+    count("field values", number)
+    values = np.full(number, np.inf)
+    parts = np.full(number if with_parts else 0, -1, np.int32)
+    gradients = np.zeros((number if with_gradients else 0, 3))
 
     def run(first: int, step: int) -> None:
         evaluate_blocks(grids, points, first, step, _BLOCK, values, parts, gradients)
 
-    run_blocks(run, count, _BLOCK)
+    run_blocks(run, number, _BLOCK)
     return values, parts, gradients

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fig2mesh import counters
 from fig2mesh.field.body import Body
 from fig2mesh.field.compiled import run_blocks, sealed
 from fig2mesh.field.trace_kernel import trace_blocks
@@ -56,5 +57,6 @@ def trace(body: Body, rays: Rays, *, tolerance: float = 1e-4, max_steps: int = 1
             steps,
         )
 
+    counters.count("rays", count)
     run_blocks(run, count, _BLOCK)
     return Hits(depth, part_index, points, normals, steps)

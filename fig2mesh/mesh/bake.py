@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.counters import count
 from fig2mesh.field.body import Body
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
@@ -66,6 +67,7 @@ def bake(
     corners = mesh.solid.vertices[mesh.solid.faces].astype(np.float64)
     points = np.einsum("nk,nkd->nd", weights[covered], corners[face])
     normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
+    count("texels", len(face))
     seen = _seen(mesh.solid, face, points, normal, sources.grazing)
     pixels = frame.image_from_figure(points)
     color = np.empty((len(face), 3))

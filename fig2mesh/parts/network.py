@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.counters import count
 from fig2mesh.field.distance import grid_distance
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.inflate import single_threaded
@@ -60,6 +61,7 @@ def network_parts(
     from fig2mesh.nets.decode import decode_many
 
     inputs = network_inputs(canvas, divided, joints, sizes)
+    count("part networks", len(inputs))
     grids = decode_many(nets, {part: (given.mask, given.anchors) for part, given in inputs.items()}, nodes)
     return tuple(
         PartSdf(

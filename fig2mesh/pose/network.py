@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fig2mesh.counters import count
 from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import JOINT, Figure, Pose3D
 
@@ -22,6 +23,7 @@ def lift_by_network(figure: Figure, frame: ImageFrame) -> Pose3D:
     """Joints in FIGURE: x and y exactly as drawn, z from the shipped network, 0 at the pelvis."""
     from fig2mesh.nets.pose_lift import SHIPPED, lift_joints, load
 
+    count("pose network")
     drawn = np.asarray(frame.figure_from_image(figure.joints_px), np.float32)
     joints = lift_joints(load(), drawn, figure.visible if SHIPPED.visibility else None)
     return Pose3D(upright(joints))

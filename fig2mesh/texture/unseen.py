@@ -15,6 +15,7 @@ import torch
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.counters import count
 from fig2mesh.field.body import Body
 from fig2mesh.nets.head_hsv import HeadHsv, enhance
 from fig2mesh.nets.texture_fill import TextureFill, fill_inputs, sample
@@ -66,6 +67,7 @@ def shipped() -> TextureNets:
 
 def texture_coordinates(sides: Sides, net: UvUnet) -> NDArray[np.float32]:
     """(4, H, W, 2) texture coordinates of the sides."""
+    count("texture coordinate network")
     found = infer_uv(net, torch.from_numpy(sides.depth), torch.from_numpy(sides.labels))
     return np.asarray(found.movedim(1, 3).numpy())
 
@@ -89,6 +91,7 @@ def unseen_changes(
     place = torch.from_numpy(texels[..., :2]).movedim(2, 0)[None]
     colour = sample(torch.from_numpy(np.clip(front / 255, 0, 1)).movedim(2, 0)[None], place)
     flags = torch.from_numpy(texels[..., 2:])[None]
+    count("texture completion network")
     with torch.no_grad():
         change = net(fill_inputs(place, there, flags[..., 0] > 0, flags[..., 1] > 0.5, colour))
     at = torch.from_numpy(2 * uv - 1).movedim(3, 1)

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pygltflib
 import pytest
 
 from exporters.inspect import inspect
@@ -119,6 +120,33 @@ def test_without_textures_no_texture_network_runs(
     facts = inspect(tmp_path / "none.glb")
     assert facts["texture_px"] is None
     assert facts["solid"]
+
+
+@pytest.mark.parametrize("effect", ["light", "none"])
+def test_only_what_is_lit_has_normals(finished: Run, tmp_path: Path, effect: str) -> None:
+    report, target = tmp_path / "r.json", tmp_path / "a.glb"
+    arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--quality", "draft", "-q"]
+    arguments += ["--textures", "none", "--effect", effect, "-o", str(target), "--report", str(report)]
+    assert main(arguments) == 0
+    assert validate(target) == []
+    model = pygltflib.GLTF2().load(str(target))
+    facts = json.loads(report.read_text())
+    work = facts["counters"]
+    lit = effect == "light"
+    assert (model.meshes[0].primitives[0].attributes.NORMAL is not None) == lit
+    assert ("KHR_materials_unlit" in (model.extensionsUsed or [])) != lit
+    assert (work["shading normals"] > 0) == lit
+    assert work["texture coordinate network"] == work["texture completion network"] == work["texels"] == 0
+    assert work["pose network"] == 1
+    assert work["part networks"] > 0 < work["field values"]
+    assert {each["effect"]: each["run"] for each in facts["effects"]} == {"normals": lit, "light": lit}
+
+
+def test_textures_are_counted(finished: Run) -> None:
+    work = finished.report["counters"]
+    assert work["texture coordinate network"] == work["texture completion network"] == 1
+    assert work["texels"] > 10_000
+    assert work["rays"] > 0
 
 
 def digest(folder: Path) -> dict[str, str]:
