@@ -15,6 +15,7 @@ import click
 
 from fig2mesh import __version__
 from fig2mesh.settings import EFFECTS
+from fig2mesh.tradeoff_cli import tradeoff
 from fig2mesh.training import cli as training_cli
 from fig2mesh.training import data_cli
 
@@ -197,6 +198,7 @@ def doctor() -> None:
 
 data_cli.add_to(cli)
 training_cli.add_to(cli)
+cli.add_command(tradeoff)
 
 
 def main(arguments: list[str] | None = None) -> int:

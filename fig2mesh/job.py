@@ -122,7 +122,7 @@ def run(
             advance(f"write {target}")
             start = time.perf_counter()
             written += write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
-            timings.append(Timing(f"write {target}", time.perf_counter() - start, _peak_mb(), "an output"))
+            timings.append(Timing(f"write {target}", time.perf_counter() - start, peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
         facts = make_report(inputs, written, asset, results, settings, height_m)
@@ -151,17 +151,17 @@ def _run_steps(
     normals = any(effect.runs for effect in planned.effects if effect.name == "normals")
     road = steps(settings, height_m, normals=normals)
     first = 0 if resume_from is None else next(i for i, step in enumerate(road) if step.name == resume_from)
-    timings += [Timing(each.name, 0.0, _peak_mb(), each.why, runs=False) for each in planned.stages if not each.runs]
+    timings += [Timing(each.name, 0.0, peak_mb(), each.why, runs=False) for each in planned.stages if not each.runs]
     for index, step in enumerate(road):
         advance(step.name)
         start = time.perf_counter()
         if index < first and step.kept:
             assert folder is not None
             results[step.name] = load_stage(folder, step.name)
-            timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb(), "read from stages", runs=False))
+            timings.append(Timing(step.name, time.perf_counter() - start, peak_mb(), "read from stages", runs=False))
             continue
         results[step.name] = step.run(*(results[name] for name in step.needs))
-        timings.append(Timing(step.name, time.perf_counter() - start, _peak_mb(), why[step.name]))
+        timings.append(Timing(step.name, time.perf_counter() - start, peak_mb(), why[step.name]))
         log.debug("%s: %.2f s", step.name, timings[-1].seconds)
         if folder is not None and step.kept:
             save_stage(folder, step.name, results[step.name])
@@ -281,7 +281,7 @@ def _write_text(path: Path, text: str) -> None:
         raise OutputError(path, error.strerror or "cannot be written", "choose another --report") from None
 
 
-def _peak_mb() -> float:
+def peak_mb() -> float:
     """Largest resident size of the process so far, MiB; 0 where the system does not tell."""
     try:
         import resource

@@ -66,7 +66,7 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
         canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, 0.9 * settings.voxel)
         infer = None
         if settings.parts != "outline":
-            infer = part_inference(pose, settings.part_nodes, settings.device)
+            infer = part_inference(pose, settings.part_nodes, settings.device, settings.precision)
         return outline_parts(canvas, pose, figure.visible, voxel=settings.voxel, device=settings.device, infer=infer)
 
     def assemble(outline: Outline) -> Body:

@@ -9,6 +9,7 @@ Quality = Literal["draft", "standard", "fine"]
 Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
+Precision = Literal["float32", "bfloat16"]
 Textures = Literal["network", "plain", "none"]
 Contours = Literal["keep", "drop"]
 
@@ -20,6 +21,7 @@ class Settings:
     canvas_px : longest side of the raster on which outlines are inflated
     voxel : spacing of the part grids
     part_nodes : nodes an edge of the grids on which the networks' fields are decoded
+    precision : of the part networks' arithmetic
     spacing : distance between neighbouring points of the scan
     triangles : of the finest mesh
     texture_size : texels along each side of the square texture
@@ -37,6 +39,7 @@ class Settings:
     canvas_px: int = 448
     voxel: float = 0.0075
     part_nodes: int = 32
+    precision: Precision = "float32"
     spacing: float = 0.0085
     triangles: int = 20_000
     texture_size: int = 1024
@@ -58,7 +61,8 @@ STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "text
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
 FIRST_USE = {
-    "parts": "lift", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
+    "parts": "lift", "part_nodes": "parts", "precision": "parts",
+    "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
     "textures": "unwrap", "contours": "textures", "light": "model",
 }  # fmt: skip

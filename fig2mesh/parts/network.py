@@ -142,9 +142,14 @@ def part_mask(canvas: Canvas, region: BoolArray, centre: NDArray[np.float64], ed
 
 
 def part_inference(
-    pose: Pose3D, nodes: int = NODES, device: str = "cpu"
+    pose: Pose3D, nodes: int = NODES, device: str = "cpu", precision: str = "float32"
 ) -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
-    """`network_parts` with the networks that come with the package, loaded once a process."""
+    """`network_parts` with the networks that come with the package, loaded once a process.
+
+    precision : "float32", or "bfloat16" for matrix products where that loses little
+    """
+    import torch
+
     from fig2mesh.nets import weights
 
     nets = {kind: weights.load(kind).to(device) for kind in KINDS}
@@ -152,7 +157,7 @@ def part_inference(
     joints = pose.joints.astype(np.float64)
 
     def infer(canvas: Canvas, divided: Split) -> tuple[PartSdf, ...]:
-        with single_threaded():
+        with single_threaded(), torch.autocast(device, torch.bfloat16, enabled=precision == "bfloat16"):
             return network_parts(canvas, divided, joints, nets, sizes, nodes)
 
     return infer

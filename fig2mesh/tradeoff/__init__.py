@@ -1,0 +1,1 @@
+"""What accuracy costs: every knob of the main job swept on a figure, error against seconds and memory."""

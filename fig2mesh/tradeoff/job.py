@@ -1,0 +1,115 @@
+"""`fig2mesh tradeoff`: the sweep of each figure, and the files that it leaves."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fig2mesh.errors import InputError, OutputError
+from fig2mesh.field.body import Body
+from fig2mesh.parse.read import read_figure
+from fig2mesh.settings import PRESETS
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Files:
+    """The files of one figure."""
+
+    name: str
+    image: Path
+    keypoints: Path
+    mask: Path | None
+
+    def arguments(self) -> dict[str, Any]:
+        """Of `read_figure`."""
+        return {"path": self.image, "keypoints": self.keypoints, "mask": self.mask, "name": self.name}
+
+
+def find_figures(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Files]:
+    """The files of folders with image.png, keypoints.json and perhaps mask.png, or of one picture."""
+    if (keypoints or mask) and (len(figures) != 1 or figures[0].is_dir()):
+        raise InputError("--keypoints", "given for several figures or a folder", "give one picture, or folders alone")
+    found = []
+    for figure in figures:
+        if figure.is_dir():
+            own = figure / "mask.png"
+            files = Files(figure.name, figure / "image.png", figure / "keypoints.json", own if own.exists() else None)
+        else:
+            files = Files(figure.stem, figure, keypoints or figure.with_name("keypoints.json"), mask)
+        # Bad input is told before minutes of work.
+        read_figure(**files.arguments())
+        found.append(files)
+    names = [files.name for files in found]
+    if len(set(names)) != len(names):
+        raise InputError("FIGURE", f"two figures named {max(names, key=names.count)}", "rename one of the folders")
+    return found
+
+
+def tradeoff(figures: Sequence[Files], folder: Path, knobs: Sequence[str], overwrite: bool, say: Say) -> None:
+    """Sweep all figures; writes tradeoff.csv, README.md and two plots a figure into `folder`, all or nothing."""
+    from fig2mesh.tradeoff.measures import measure
+    from fig2mesh.tradeoff.report import as_csv, plot, rows, summary
+    from fig2mesh.tradeoff.sweep import requests, sweep
+    from fig2mesh.tradeoff.tolerance import tolerances
+
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not overwrite:
+        raise OutputError(folder, "exists and is not an empty folder", "pass --overwrite or another folder")
+    partial = folder.with_name(f".{folder.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    try:
+        partial.mkdir(parents=True)
+    except OSError as error:
+        raise OutputError(folder, error.strerror or "cannot be made", "choose another folder") from None
+    try:
+        table, pages = [], []
+        count = sum(1 for _ in requests(knobs))
+        for files in figures:
+            found = []
+            finest = None
+            for number, run in enumerate(sweep(files.arguments(), knobs), 1):
+                label = f"{run.knob} {run.value}".strip()
+                say(f"{files.name} {number}/{count} {label}: {run.failure or f'{run.total_s:.1f} s'}")
+                if finest is None:
+                    finest = run.mesh
+                    if finest is None:
+                        raise InputError(files.name, run.failure, "give a figure that the main job can make")
+                    say(f"{files.name}: errors are measured against this one")
+                found.append(measure(run, finest))
+            table += rows(files.name, found)
+            plot(found, partial, files.name)
+            pages.append(summary(files.name, found, tolerances(_body(files)), _machine()))
+        head = (
+            "# What accuracy costs\n\nWritten by `fig2mesh tradeoff`; the numbers are in [tradeoff.csv](tradeoff.csv)."
+        )
+        (partial / "README.md").write_text("\n\n".join([head, *pages]), encoding="utf-8")
+        (partial / "tradeoff.csv").write_text(as_csv(table), encoding="utf-8")
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in sorted(partial.iterdir()):
+            os.replace(path, folder / path.name)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def _body(files: Files) -> Body:
+    from fig2mesh.pipeline import steps
+
+    results: dict[str, Any] = {"figure": read_figure(**files.arguments())}
+    for step in steps(PRESETS["standard"], 1.79):
+        if step.name not in ("lift", "parts", "body"):
+            break
+        results[step.name] = step.run(*(results[name] for name in step.needs))
+    body = results["body"]
+    assert isinstance(body, Body)
+    return body
+
+
+def _machine() -> str:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return f"{cores} cores of {platform.machine()}, {platform.system()}"

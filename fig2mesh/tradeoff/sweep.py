@@ -1,0 +1,150 @@
+"""The knobs, their values, and one run of the pipeline in a process of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from exporters.asset import TexturedMesh
+from fig2mesh.paper import FIGURE_HEIGHT
+from fig2mesh.records import Figure
+from fig2mesh.settings import PRESETS, Settings
+
+FINEST: Final = replace(PRESETS["fine"], voxel=0.004, spacing=0.005, triangles=120_000)
+"""What errors are measured against: finer than any value of the sweep, but for the texture, which is as fine."""
+
+KNOBS: Final[Mapping[str, tuple[Any, ...]]] = {
+    "quality": ("draft", "standard", "fine"),
+    "parts": ("outline",),
+    "precision": ("bfloat16",),
+    "part_nodes": (16, 24, 48),
+    "canvas_px": (192, 320, 768),
+    "voxel": (0.02, 0.012, 0.005),
+    "spacing": (0.02, 0.012, 0.006),
+    "mesher": ("isosurface",),
+    "closing": ("fill",),
+    "triangles": (2_000, 6_000, 60_000),
+    "texture_size": (256, 512, 2048),
+    "textures": ("plain", "none"),
+}
+"""Knob → values beside the standard preset's own; the others stay as in that preset. "quality" is all at once."""
+
+STAGES_OF: Final[Mapping[str, str]] = {
+    "parts": "parts", "precision": "parts", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts",
+    "spacing": "cloud", "mesher": "solid", "closing": "solid", "triangles": "simplify", "texture_size": "bake",
+    "textures": "textures",
+}  # fmt: skip
+"""Knob → the stage that it is about."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A request and what came of it.
+
+    knob, value : what differs from the standard preset; "" for that preset itself
+    seconds : by stage; peak_mb : largest resident size of the process
+    mesh : the model; None where the run failed, and `failure` says why
+    """
+
+    knob: str
+    value: str
+    seconds: Mapping[str, float]
+    peak_mb: float
+    mesh: TexturedMesh | None
+    front_ssim: float = float("nan")
+    silhouette_iou: float = float("nan")
+    failure: str = ""
+
+    @property
+    def total_s(self) -> float:
+        """Seconds of all stages."""
+        return sum(self.seconds.values())
+
+
+def requests(knobs: Sequence[str]) -> Iterator[tuple[str, str, Settings]]:
+    """(knob, value, settings) of every run: the finest, the presets, then each knob's values."""
+    yield "finest", "", FINEST
+    yield "", "standard", PRESETS["standard"]
+    for knob in knobs:
+        for value in KNOBS[knob]:
+            if knob == "quality":
+                if value != "standard":
+                    yield knob, value, PRESETS[value]
+                continue
+            yield knob, str(value), replace(PRESETS["standard"], **{knob: value})
+
+
+def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
+    """One run of the pipeline, timed; a fault of the figure is kept, not raised."""
+    from fig2mesh.errors import FigureError
+    from fig2mesh.job import peak_mb
+    from fig2mesh.measure import front_similarity, silhouette_iou
+    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.parts.pieces import clean
+    from fig2mesh.pipeline import steps
+    from fig2mesh.placing import asset_from_figure, on_drawing
+
+    seconds: dict[str, float] = {}
+    try:
+        drawn, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+        results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
+        for step in steps(settings, FIGURE_HEIGHT):
+            start = time.perf_counter()
+            results[step.name] = step.run(*(results[name] for name in step.needs))
+            seconds[step.name] = time.perf_counter() - start
+    except FigureError as error:
+        return Run(knob, value, seconds, peak_mb(), None, failure=str(error))
+    peak = peak_mb()
+    mesh: TexturedMesh = results["model"][0]
+    transform = asset_from_figure(results["lift"], results["simplify"][0].vertices, FIGURE_HEIGHT)
+    pixel, origin = on_drawing(image_frame(drawn), transform)
+    ssim = float("nan")
+    if mesh.texture is not None:
+        found = front_similarity(mesh, drawn.rgba, drawn.mask, metres_per_pixel=pixel, origin_px=origin)
+        ssim = found.ssim
+    iou = silhouette_iou(mesh, drawn.mask, metres_per_pixel=pixel, origin_px=origin)
+    return Run(knob, value, seconds, peak, mesh, ssim, iou)
+
+
+def sweep(paths: Mapping[str, Path | None], knobs: Sequence[str]) -> Iterator[Run]:
+    """Every run in a fresh process, one at a time, so that no run profits from what another left in memory.
+
+    paths : keyword arguments of `read_figure`, the picture as "path"
+    """
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    context = multiprocessing.get_context("spawn")
+    for knob, value, settings in requests(knobs):
+        with ProcessPoolExecutor(1, context) as pool:
+            yield pool.submit(_in_process, dict(paths), knob, value, settings).result()
+
+
+def _in_process(paths: dict[str, Any], knob: str, value: str, settings: Settings) -> Run:
+    from fig2mesh.parse.read import read_figure
+
+    figure = read_figure(paths.pop("path"), **paths)
+    warm_up()
+    return run(figure, knob, value, settings)
+
+
+def warm_up() -> None:
+    """Load compiled kernels and libraries: what every run pays alike is not what is measured."""
+    import open3d
+    import torch
+
+    from fig2mesh.field.analytic import mannequin
+    from fig2mesh.field.body import Body
+    from fig2mesh.field.camera import orthographic
+    from fig2mesh.field.trace import trace
+
+    assert open3d.__version__
+    assert torch.__version__
+    body = Body(mannequin(16))
+    trace(body, orthographic(0.0, size=(16, 16), height=2.0))
+    body.project(np.zeros((4, 3), np.float32))
