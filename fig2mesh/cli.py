@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__
+from fig2mesh import __version__, render_cli
 from fig2mesh.training import cli as training_cli
 from fig2mesh.training import data_cli
 
@@ -176,6 +176,7 @@ def doctor() -> None:
         raise SystemExit(1)
 
 
+render_cli.add_to(cli)
 data_cli.add_to(cli)
 training_cli.add_to(cli)
 
