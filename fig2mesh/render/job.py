@@ -26,7 +26,7 @@ from fig2mesh.render.scene import FieldScene, MeshScene, Scene
 from fig2mesh.render.sun import Sun, parse_time, sun_at, towards_sun
 from fig2mesh.settings import Settings, settings_for
 from georef.bearing import parse_facing
-from georef.placement import GeoPlacement
+from georef.placement import check_lonlat
 
 log = logging.getLogger("fig2mesh")
 
@@ -189,8 +189,8 @@ def _sun(effects: frozenset[Effect], lonlat: tuple[float, float] | None, text: s
         raise InputError("--effects", "sun without a place", "pass --lonlat LON LAT")
     if text is None:
         raise InputError("--effects", "sun without a time", "pass --time 2026-06-21T14:00+02:00")
-    place = GeoPlacement(lonlat[0], lonlat[1], 0.0, "ellipsoid", 0.0, 1.0)
-    return sun_at(place.lon_deg, place.lat_deg, parse_time(text))
+    check_lonlat(*lonlat)
+    return sun_at(*lonlat, parse_time(text))
 
 
 def _timing(
