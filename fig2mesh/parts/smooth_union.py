@@ -10,7 +10,8 @@ from fig2mesh.field.blend import blend
 from fig2mesh.field.body import Body
 from fig2mesh.field.evaluate import evaluate
 from fig2mesh.field.grids import pack
-from fig2mesh.parts.fillets import NEIGHBOURS
+from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.fillets import NEIGHBOURS, within
 from fig2mesh.records import PartSdf
 
 RADIUS = 0.07
@@ -20,21 +21,27 @@ SHARED_COSINE = 0.7
 """Parts whose gradients agree so well where both surfaces pass have one surface between them."""
 
 
-def smooth_union(body: Body, radius: float = RADIUS) -> Body:
+def smooth_union(body: Body, canvas: Canvas | None = None, radius: float = RADIUS) -> Body:
     """The body with fillets between all kinematic neighbours that cross each other.
+
+    canvas : whose drawn contour the fillets leave as it is; None: there is none
 
     A hand on a hip keeps its crease. Parts that are cut from one surface are smooth already: where one ends in the
     other, a smooth minimum would only swell into a ring, so they get no fillet.
     """
+    # What has a fillet already are surfaces of their own, even where they run along each other.
+    filleted = {(first, second) for first, second, _ in body.fillets}
     thickness = [-float(part.grid.min()) for part in body.parts]
     made = []
     for first, second in combinations(range(len(body.parts)), 2):
         a, b = body.parts[first], body.parts[second]
         size = min(radius, thickness[first], thickness[second])
-        if frozenset((a.part, b.part)) in NEIGHBOURS and size > 0 and _cross(a, b):
-            fillet = blend(a, b, size, creases_only=True)
+        if frozenset((a.part, b.part)) not in NEIGHBOURS or size <= 0:
+            continue
+        if (first, second) in filleted or _cross(a, b):
+            fillet = blend(a, b, size, creases_only=(first, second) not in filleted)
             if fillet is not None:
-                made.append((first, second, fillet))
+                made.append((first, second, fillet if canvas is None else within(canvas, fillet, size)))
     return Body(body.parts, body.smooth, (*body.fillets, *made))
 
 

@@ -162,7 +162,9 @@ def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldSc
 
     for goal in ("body", "textures") if textures else ("body",):
         make(road[goal])
-    body = smooth_union(results["body"]) if "smooth-union" in request.effects else results["body"]
+    body = results["body"]
+    if "smooth-union" in request.effects:
+        body = smooth_union(body, results["parts"].canvas)
     return FieldScene(body, results.get("textures"), image_frame(figure))
 
 

@@ -29,6 +29,7 @@ from fig2mesh.render.shading import (
     key_direction,
     lit,
 )
+from tests.drawn import Sketch, assemble
 from tests.fig2mesh.render.scenes import (
     DRAWN,
     HEAD,
@@ -318,6 +319,17 @@ def test_smooth_union_does_not_swell_limbs_that_share_a_surface() -> None:
         replace(whole, part=HEAD, grid=np.maximum(whole.grid, -0.05 - y)),
     ))  # fmt: skip
     assert not smooth_union(halves).fillets
+
+
+def test_smooth_union_keeps_the_drawn_contour() -> None:
+    joints = {"r_elbow": (95.0, 130.0), "r_wrist": (125.0, 140.0), "r_hand": (133.0, 141.0)}
+    drawn = assemble(Sketch(**joints).legs().arms(width=26).trunk().head().figure())
+    round_ = smooth_union(drawn.body, drawn.outline.canvas)
+    assert len(round_.fillets) > len(drawn.body.fillets)
+    bare, grown = (render(FieldScene(body), Request("depth", size=(240, 320))).rgba for body in (drawn.body, round_))
+    more = (bare[..., 3] != grown[..., 3]).sum() / (bare[..., 3] > 0).sum()
+    assert more < 0.003
+    assert (bare[..., 0] != grown[..., 0]).any()
 
 
 def view_rays(scene: FieldScene):  # type: ignore[no-untyped-def]
