@@ -29,7 +29,7 @@ EFFECT_HELP = "; ".join(f"{name}: {title}" for name, title in EFFECTS.items())
     "--pitch", type=click.FloatRange(-90, 90), default=0.0, show_default=True, metavar="DEG", help="90 looks down.",
 )  # fmt: skip
 @click.option(
-    "--size", type=click.IntRange(1, 16384), nargs=2, default=(480, 640), show_default=True, metavar="W H",
+    "--size", type=click.IntRange(1, 8192), nargs=2, default=(480, 640), show_default=True, metavar="W H",
     help="Pixels.",
 )  # fmt: skip
 @click.option(

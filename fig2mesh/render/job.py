@@ -33,8 +33,8 @@ log = logging.getLogger("fig2mesh")
 FRAMES, FPS = 36, 12.5
 """A turn in three seconds; a GIF can keep 8 hundredths of a second for each frame exactly."""
 
-MOST_RAYS = 1 << 28
-"""For one picture; more take hours."""
+MOST_RAYS = 1 << 26
+"""For one picture: 8192 x 8192 pixels of one ray need 2 GB."""
 
 Colour = tuple[int, int, int]
 

@@ -98,7 +98,7 @@ def render(scene: Scene, request: Request) -> Picture:
     border = math.ceil(request.outline_px / 2) + 2 if need.edges else 0
     rows = max(1, RAYS_AT_ONCE // (fine.size[0] * request.samples) - 2 * border)
     width, height = request.size
-    result = np.empty((height, width, 4))
+    result = np.empty((height, width, 4), np.float32)
     counts = Counts()
     for first in range(0, height, rows):
         last = min(first + rows, height)
@@ -110,11 +110,11 @@ def render(scene: Scene, request: Request) -> Picture:
     return Picture(_finished(result, request.background), counts)
 
 
-def _finished(picture: Floats, background: tuple[int, int, int] | None) -> ByteArray:
+def _finished(picture: NDArray[np.float32], background: tuple[int, int, int] | None) -> ByteArray:
     """Bytes of premultiplied colours 0-255 and coverage 0-1."""
     cover = picture[..., 3:]
     if background is not None:
-        colour = picture[..., :3] + (1 - cover) * np.array(background, np.float64)
+        colour = picture[..., :3] + (1 - cover) * np.array(background, np.float32)
         cover = np.ones_like(cover)
     else:
         colour = picture[..., :3] / np.maximum(cover, 1e-9)

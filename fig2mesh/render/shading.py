@@ -11,9 +11,9 @@ from fig2mesh.field.camera import axes
 
 Floats = NDArray[np.float64]
 
-AMBIENT, FILL, KEY = 0.11, 0.26, 0.98
+AMBIENT, FILL, KEY = 0.10, 0.24, 0.88
 """Shares of white light: from everywhere, soft from one side, and of the lamp at right angles. A white wall facing the
-viewer of `light` comes to 0.95: drawings keep their brightness, and only what faces the lamp clips."""
+viewer of `light` comes to 0.85: drawings keep most of their brightness, and only what faces the lamp clips."""
 
 KEY_LIGHT = (-0.50, 0.62, 0.60)
 """Towards the lamp: right and up as seen, and towards the viewer, over level ground whatever the camera's pitch."""

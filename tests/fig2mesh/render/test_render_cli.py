@@ -156,7 +156,7 @@ BAD = {
     "colour": (("-o", "a.png", "--background", "sky-ish"), "sky-ish"),
     "outline colour": (("-o", "a.png", "--outline-colour", "x"), "--outline-colour"),
     "size": (("-o", "a.png", "--size", "0", "10"), "--size"),
-    "too large": (("-o", "a.png", "--size", "16384", "16384", "--samples", "8"), "--size"),
+    "too large": (("-o", "a.png", "--size", "8192", "8192", "--samples", "8"), "--size"),
     "film": (("-o", "a.mp4"), "ffmpeg"),
     "no output": ((), "--output"),
     "no folder": (("-o", "a.png", "--report", "missing/report.json"), "missing"),
