@@ -76,7 +76,7 @@ def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: st
     parts: dict[str, Path] = {}
     for path in paths:
         main = _main_file(path)
-        _check(path, main, overwrite)
+        check_file(path, main, overwrite)
         for companion in _companions(path, name, lods):
             if companion.exists() and not overwrite:
                 raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
@@ -103,13 +103,29 @@ def write(
     Raises ExportError as `check_outputs` does, and where the disk refuses.
     """
     main = _main_file(path)
-    _check(path, main, overwrite)
+    check_file(path, main, overwrite)
+
+    def fill(stage: Path) -> None:
+        if main.name == "tileset.json":
+            write_tileset(asset, stage, visible_from_m)
+        else:
+            FORMATS[main.suffix.lower()].writer(asset, stage / main.name)
+
+    return write_whole(path, main, fill, overwrite)
+
+
+def write_whole(path: OutputPath, main: Path, fill: Callable[[Path], None], overwrite: bool) -> tuple[Path, ...]:
+    """Put the files that `fill` makes in a folder beside `main`, all of them or none; `main` comes last.
+
+    path : the output as it was asked for, for messages
+    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others
+    returns : the files written
+
+    Raises ExportError where the disk refuses, or a file is there already although `overwrite` is off.
+    """
     try:
         with _folders(main.parent), _staging(main.parent) as stage:
-            if main.name == "tileset.json":
-                write_tileset(asset, stage, visible_from_m)
-            else:
-                FORMATS[main.suffix.lower()].writer(asset, stage / main.name)
+            fill(stage)
             names = sorted(file.name for file in stage.iterdir() if file.name != main.name) + [main.name]
             _put_in_place(stage, main.parent, names, overwrite)
     except OSError as error:
@@ -136,7 +152,11 @@ def _companions(path: OutputPath, name: str, lods: int) -> list[Path]:
     return [file.with_name(file.stem + ending) for ending in FORMATS[file.suffix.lower()].beside]
 
 
-def _check(path: OutputPath, main: Path, overwrite: bool) -> None:
+def check_file(path: OutputPath, main: Path, overwrite: bool) -> None:
+    """Find out what would keep `main` from being written.
+
+    path : the output as it was asked for, for messages. Raises ExportError.
+    """
     name = os.fspath(path)
     if main.is_dir():
         raise ExportError(name, "is a folder", "remove it or choose another name")

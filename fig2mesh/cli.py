@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__
+from fig2mesh import __version__, render_cli
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
 from fig2mesh.training import cli as training_cli
@@ -196,6 +196,7 @@ def doctor() -> None:
         raise SystemExit(1)
 
 
+render_cli.add_to(cli)
 data_cli.add_to(cli)
 training_cli.add_to(cli)
 cli.add_command(tradeoff)

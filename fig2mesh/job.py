@@ -69,7 +69,7 @@ def run(
     verbose: int,
 ) -> None:
     """What `fig2mesh FIGURE …` does; the parameters are the options of the command line."""
-    _configure_logging(quiet, verbose)
+    configure_logging(quiet, verbose)
     placement = _placement(lonlat, facing, height_m, altitude, altitude_datum)
     targets = outputs or (figure.stem + ".glb",)
     # Everything that can be refused is refused before the work begins.
@@ -81,14 +81,14 @@ def run(
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
-        _check_report(report, overwrite)
+        check_report(report, overwrite)
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
     if lods > 1 and resume_from is None and not any(is_tileset(target) for target in targets):
         log.info("--lods %d: only 3D Tiles have levels of detail; one is made", lods)
         lods = 1
     settings = _settings(
         quality=quality, triangles=triangles, texture_size=texture_size, lods=lods, parts=parts, textures=textures,
-        contours=contours, effects=effects, mesher=mesher, closing=closing, device=_device(device), seed=seed,
+        contours=contours, effects=effects, mesher=mesher, closing=closing, device=torch_device(device), seed=seed,
     )  # fmt: skip
     stages = None if save_stages is None else _stages(save_stages, drawn, settings, resume_from)
 
@@ -129,7 +129,7 @@ def run(
         facts["stages"] = [timing.as_dict() for timing in timings]
         facts["effects"] = [{"effect": each.name, "run": each.runs, "why": each.why} for each in planned.effects]
         facts["counters"] = counts
-        _write_text(report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
+        write_text(report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     for target in targets:
         log.info("%s", target)
 
@@ -242,7 +242,8 @@ def _light(effects: tuple[str, ...]) -> bool | None:
     return "light" in effects if effects else None
 
 
-def _device(name: str) -> str:
+def torch_device(name: str) -> str:
+    """The device that --device names: "cpu" or "cuda"."""
     import torch
 
     if name == "cpu":
@@ -262,7 +263,8 @@ def _part_names(levels: Any) -> dict[int, str]:
     return {int(label): PART_NAMES[label] for label in labels}
 
 
-def _check_report(path: Path, overwrite: bool) -> None:
+def check_report(path: Path, overwrite: bool) -> None:
+    """Refuse a --report that could not be written."""
     if path.is_dir():
         raise OutputError(path, "is a folder", "give --report a file name")
     if path.exists() and not overwrite:
@@ -271,7 +273,8 @@ def _check_report(path: Path, overwrite: bool) -> None:
         raise OutputError(path, f"no folder {path.parent}", "create it first")
 
 
-def _write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str) -> None:
+    """Write a --report, whole or not at all."""
     partial = path.with_name(f".{path.name}.partial")
     try:
         partial.write_text(text, encoding="utf-8")
@@ -291,7 +294,8 @@ def peak_mb() -> float:
     return peak / (1 << 20) if sys.platform == "darwin" else peak / 1024
 
 
-def _configure_logging(quiet: bool, verbose: int) -> None:
+def configure_logging(quiet: bool, verbose: int) -> None:
+    """Messages to stderr, as many as asked for."""
     level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.INFO
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("%(message)s"))

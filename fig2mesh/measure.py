@@ -143,7 +143,7 @@ def shape_measures(mesh: TexturedMesh) -> dict[str, Any]:
 
 
 def load_textured(path: Path | str) -> TexturedMesh:
-    """Read a .glb or .gltf file with one mesh back, as any other program would (trimesh).
+    """Read a .glb, .gltf, .ply or .obj file with one mesh back, as any other program would (trimesh).
 
     Vertices at equal positions become one vertex of the solid; part labels, observed mask and levels of detail are
     not read. Raises ExportError where the file cannot be read or does not hold exactly one triangle mesh.
@@ -155,7 +155,7 @@ def load_textured(path: Path | str) -> TexturedMesh:
         nodes = [scene.graph[name] for name in scene.graph.nodes_geometry]
     except Exception as error:  # trimesh raises whatever its parsers stumble over
         reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise ExportError(path, f"cannot be read ({reason})", "give a .glb or .gltf file") from None
+        raise ExportError(path, f"cannot be read ({reason})", "give a .glb, .gltf, .ply or .obj file") from None
     if len(nodes) != 1 or not isinstance(scene.geometry[nodes[0][1]], trimesh.Trimesh):
         raise ExportError(path, f"{len(nodes)} meshes", "give a file with exactly one triangle mesh")
     asset_from_node, name = nodes[0]
@@ -170,11 +170,14 @@ def load_textured(path: Path | str) -> TexturedMesh:
         if body.visual.uv is not None:
             # trimesh turns v round on reading; here row 0 is v = 0, as in the file.
             uv = np.clip(body.visual.uv * (1, -1) + (0, 1), 0.0, 1.0).astype(np.float32)
-        image = getattr(body.visual.material, "baseColorTexture", None)
+        # glTF's material, and that of OBJ.
+        image = getattr(body.visual.material, "baseColorTexture", None) or getattr(body.visual.material, "image", None)
         if image is not None and uv is not None:
             texture = Texture(np.asarray(image.convert("RGBA" if image.mode == "RGBA" else "RGB")))
         if "color" in body.visual.vertex_attributes:
             colors = _srgb(np.asarray(body.visual.vertex_attributes["color"])[:, :3])
+    elif body.visual.kind == "vertex" and Path(path).suffix.lower() in (".ply", ".obj"):
+        colors = np.asarray(body.visual.vertex_colors[:, :3], np.uint8)
     return TexturedMesh(
         vertices=vertices,
         faces=faces,

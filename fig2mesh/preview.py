@@ -84,7 +84,7 @@ def render_mesh(
     # Centred and of unit size, so that single precision serves figures of a millimetre and of a kilometre alike.
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre, unit = (low + high) / 2, max(float((high - low).max()), 1e-30)
-    scene = _scene((vertices - centre) / unit, mesh.faces)
+    scene = raycasting_scene((vertices - centre) / unit, mesh.faces)
     x = ((left + (np.arange(width * samples) + 0.5) / (width * samples) * (right - left)) - centre[0]) / unit
     y = ((top - (np.arange(height * samples) + 0.5) / (height * samples) * (top - bottom)) - centre[1]) / unit
 
@@ -188,7 +188,8 @@ def _fitted(bounds: Bounds, size: tuple[int, int]) -> Bounds:
     return x - pixel * width / 2, y - pixel * height / 2, x + pixel * width / 2, y + pixel * height / 2
 
 
-def _scene(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Any:
+def raycasting_scene(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Any:
+    """Open3D's ray caster of a mesh; vertices of about unit size, as it computes in single precision."""
     import open3d as o3d
 
     scene = o3d.t.geometry.RaycastingScene()
@@ -231,16 +232,11 @@ def _colours(
 ) -> NDArray[np.floating]:
     """(N, 3) colours 0-255 of points given by their triangles' corners (N, 3) and barycentric weights (N, 3)."""
 
-    def at(values: NDArray[Any]) -> NDArray[Any]:
-        # Corner by corner: one gather of all three would need three times the memory.
-        return np.asarray(sum(weights[:, k, None] * values[corners[:, k]] for k in range(3)))
-
-    if mode == "textured" and mesh.texture is not None and mesh.uv is not None:
-        texels = sample(mesh.texture, at(mesh.uv))
-        return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
-    if mode == "textured" and mesh.colors is not None:
-        return at(mesh.colors)
-    normals = at(mesh.shading_normals) @ view_from_asset.T
+    if mode == "textured":
+        colours = mesh_colours(mesh, corners, weights)
+        if colours is not None:
+            return colours
+    normals = interpolated(mesh.shading_normals, corners, weights) @ view_from_asset.T
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     if mode == "normals":
         return 127.5 * (normals + 1.0)
@@ -248,11 +244,27 @@ def _colours(
     light = 0.5 + 0.5 * (normals @ (np.array(KEY_LIGHT) / np.linalg.norm(KEY_LIGHT)))[:, None]
     shade = 0.30 + 0.75 * light**1.5
     if mode == "observed" and mesh.observed is not None and mesh.uv is not None:
-        share = sample(mesh.observed, at(mesh.uv))[:, :1] / 255.0
+        share = sample(mesh.observed, interpolated(mesh.uv, corners, weights))[:, :1] / 255.0
         base = share * np.array(OBSERVED) + (1 - share) * np.array(INFERRED)
     else:
         base = np.array(CLAY)
     return np.asarray(np.minimum(shade * base, 255.0))
+
+
+def interpolated(values: NDArray[Any], corners: NDArray[np.int32], weights: NDArray[np.float32]) -> NDArray[Any]:
+    """(N, K) what vertices have (V, K), at points given by corners (N, 3) and barycentric weights (N, 3)."""
+    # Corner by corner: one gather of all three would need three times the memory.
+    return np.asarray(sum(weights[:, k, None] * values[corners[:, k]] for k in range(3)))
+
+
+def mesh_colours(
+    mesh: TexturedMesh, corners: NDArray[np.int32], weights: NDArray[np.float32]
+) -> NDArray[np.floating] | None:
+    """(N, 3) sRGB 0-255 of the texture, else of the vertices, at such points; None where the mesh has neither."""
+    if mesh.texture is not None and mesh.uv is not None:
+        texels = sample(mesh.texture, interpolated(mesh.uv, corners, weights))
+        return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
+    return None if mesh.colors is None else interpolated(mesh.colors, corners, weights)
 
 
 def _drawing_cell(

@@ -61,6 +61,7 @@ def orthographic(
     height: float,
     centre: Any = (0.0, 0.0, 0.0),
     distance: float = 10.0,
+    rows: tuple[int, int] | None = None,
 ) -> Rays:
     """Parallel rays, row by row.
 
@@ -68,9 +69,10 @@ def orthographic(
     height : what the picture shows from top to bottom, FIGURE units
     centre : (3,) FIGURE, shown in the middle of the picture
     distance : from `centre` back to the plane where rays start, and depths count from
+    rows : first and behind-last row of the picture; None: all
     """
     right, up, back = axes(yaw_deg, pitch_deg)
-    across, upward = _picture(size, height)
+    across, upward = _picture(size, height, rows)
     start = np.asarray(centre, np.float64) + distance * back
     origins = start + across[..., None] * right + upward[..., None] * up
     return Rays(_rows(origins), _rows(np.broadcast_to(-back, origins.shape)))
@@ -84,6 +86,7 @@ def perspective(
     height: float,
     centre: Any = (0.0, 0.0, 0.0),
     distance: float = 5.0,
+    rows: tuple[int, int] | None = None,
 ) -> Rays:
     """Rays from one point at `distance` from `centre`, row by row; arguments as for `orthographic`.
 
@@ -91,7 +94,7 @@ def perspective(
     2 atan(height / (2 distance)), and the picture tends to the orthographic one as the distance grows.
     """
     right, up, back = axes(yaw_deg, pitch_deg)
-    across, upward = _picture(size, height)
+    across, upward = _picture(size, height, rows)
     directions = across[..., None] * right + upward[..., None] * up - distance * back
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     eye = np.asarray(centre, np.float64) + distance * back
@@ -110,15 +113,18 @@ def images(hits: Hits, size: tuple[int, int]) -> Images:
     )
 
 
-def _picture(size: tuple[int, int], height: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _picture(
+    size: tuple[int, int], height: float, band: tuple[int, int] | None
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(H, W) offsets of the pixel centres from the middle of the picture, to the right and upwards."""
     columns, rows = size
     if columns < 1 or rows < 1 or not height > 0:
         raise ValueError(f"camera: size {size} and height {height}, expected positive numbers")
     pixel = height / rows
     across = (np.arange(columns) + 0.5 - columns / 2) * pixel
-    upward = (rows / 2 - np.arange(rows) - 0.5) * pixel
-    return np.broadcast_to(across, (rows, columns)), np.broadcast_to(upward[:, None], (rows, columns))
+    upward = (rows / 2 - np.arange(*(band or (0, rows))) - 0.5) * pixel
+    shape = (len(upward), columns)
+    return np.broadcast_to(across, shape), np.broadcast_to(upward[:, None], shape)
 
 
 def _rows(array: NDArray[Any]) -> FloatArray:

@@ -69,17 +69,9 @@ def bake(
     normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
     count("texels", len(face))
     seen = _seen(mesh.solid, face, points, normal, sources.grazing)
-    pixels = frame.image_from_figure(points)
     color = np.empty((len(face), 3))
-    color[seen] = _bilinear(sources.seen, pixels[seen])
-    labels = face_parts[face]
-    for label in np.unique(labels[~seen]):
-        chosen = ~seen & (labels == label)
-        picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
-        color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
-    if body is not None and sources.pen is not None:
-        ink = crease_ink(body, points[~seen], normal[~seen], sources.pen.width)[:, None]
-        color[~seen] += ink * (sources.pen.colour - color[~seen])
+    color[seen] = drawn_colours(sources, frame, points[seen])
+    color[~seen] = plain_colours(sources, frame, points[~seen], normal[~seen], face_parts[face[~seen]], body)
     image = np.zeros((size, size, 3), np.uint8)
     image[covered] = np.clip(np.round(color), 0, 255).astype(np.uint8)
     observed = np.zeros((size, size), np.uint8)
@@ -131,6 +123,36 @@ def _seen(
     rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
     seen[seen] = ~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
     return np.asarray(seen)
+
+
+def drawn_colours(sources: Sources, frame: ImageFrame, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 3) sRGB 0-255: what the drawing shows in front of points (N, 3), FIGURE."""
+    return _bilinear(sources.seen, frame.image_from_figure(points))
+
+
+def plain_colours(
+    sources: Sources,
+    frame: ImageFrame,
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    labels: ByteArray,
+    body: Body | None,
+) -> NDArray[np.float64]:
+    """(N, 3) sRGB 0-255 of points that the drawing does not show: plain areas, and ink in the creases.
+
+    points, normals : (N, 3) FIGURE; labels : (N,) of the part each lies on
+    body : whose creases are inked where the drawing has contours; None for none
+    """
+    pixels = frame.image_from_figure(points)
+    color = np.empty((len(points), 3))
+    for label in np.unique(labels):
+        chosen = labels == label
+        picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
+        color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
+    if body is not None and sources.pen is not None:
+        ink = crease_ink(body, points, normals, sources.pen.width)[:, None]
+        color += ink * (sources.pen.colour - color)
+    return color
 
 
 def crease_ink(

@@ -43,11 +43,11 @@ def make_fillets(
         radius = min(RADIUS, thickness[first], thickness[second])
         fillet = blend(parts[first], parts[second], radius) if radius > 0 else None
         if fillet is not None:
-            found.append((first, second, _within(canvas, fillet, radius)))
+            found.append((first, second, within(canvas, fillet, radius)))
     return tuple(found)
 
 
-def _within(canvas: Canvas, fillet: PartSdf, radius: float) -> PartSdf:
+def within(canvas: Canvas, fillet: PartSdf, radius: float) -> PartSdf:
     """A fillet that shrinks to nothing towards the drawn contour: it is a quarter of its radius deep at most."""
     axis = np.linspace(-fillet.edge / 2, fillet.edge / 2, fillet.grid.shape[0])
     columns = np.stack(np.meshgrid(fillet.centre[0] + axis, fillet.centre[1] + axis, indexing="ij"), axis=-1)

@@ -1,0 +1,1 @@
+"""Pictures of figures and models: stills and turntables, with effects that cost nothing unless asked for."""

@@ -1,0 +1,249 @@
+"""`fig2mesh render`: read a drawing or a model, make the pictures, write them. All side effects are here."""
+
+from __future__ import annotations
+
+import json
+import logging
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from PIL import ImageColor
+
+from fig2mesh.errors import FigureError, InputError
+from fig2mesh.job import check_report, configure_logging, torch_device, write_text
+from fig2mesh.parse.read import read_figure
+from fig2mesh.records import ByteArray, Figure
+from fig2mesh.render.counts import Counts
+from fig2mesh.render.effects import Effect, Mode, check_effects, parse_effects
+from fig2mesh.render.images_out import KINDS, check_pictures, kind_of, write_pictures
+from fig2mesh.render.model import SUFFIXES, read_model
+from fig2mesh.render.needs import needs
+from fig2mesh.render.picture import Request, render, view_of
+from fig2mesh.render.scene import FieldScene, MeshScene, Scene
+from fig2mesh.render.sun import Sun, parse_time, sun_at, towards_sun
+from fig2mesh.settings import Settings, settings_for
+from georef.bearing import parse_facing
+from georef.placement import check_lonlat
+
+log = logging.getLogger("fig2mesh")
+
+FRAMES, FPS = 36, 12.5
+"""A turn in three seconds; a GIF can keep 8 hundredths of a second for each frame exactly."""
+
+MOST_RAYS = 1 << 26
+"""For one picture: 8192 x 8192 pixels of one ray need 2 GB."""
+
+Colour = tuple[int, int, int]
+
+
+@dataclass
+class _Total:
+    """What the pictures made so far took."""
+
+    counts: Counts = field(default_factory=Counts)
+    pictures: int = 0
+
+
+def run(
+    *,
+    source: Path,
+    output: str,
+    mode: Mode,
+    effects: tuple[str, ...],
+    yaw: float,
+    pitch: float,
+    size: tuple[int, int],
+    samples: int | None,
+    background: str | None,
+    ground: bool,
+    outline_width: float,
+    outline_colour: str,
+    lonlat: tuple[float, float] | None,
+    time_: str | None,
+    facing: str,
+    frames: int | None,
+    fps: float | None,
+    seconds: float | None,
+    mask: Path | None,
+    keypoints: Path | None,
+    part_labels: Path | None,
+    bbox: tuple[int, int, int, int] | None,
+    quality: Any,
+    parts: str,
+    textures: str | None,
+    contours: str,
+    device: str,
+    seed: int,
+    report: Path | None,
+    overwrite: bool,
+    quiet: bool,
+    verbose: int,
+) -> None:
+    """What `fig2mesh render FIGURE …` does; the parameters are the options of the command line."""
+    configure_logging(quiet, verbose)
+    # Everything that can be refused is refused before the work begins.
+    wanted = parse_effects(effects)
+    fields = source.suffix.lower() not in SUFFIXES
+    check_effects(mode, wanted, fields=fields)
+    if not fields and (mask, keypoints, part_labels, bbox, textures) != (None,) * 5:
+        raise InputError(source, "is a finished model, which needs no --mask, --keypoints …", "leave them out")
+    sun = _sun(wanted, lonlat, time_)
+    bearing = parse_facing(facing)
+    kind = kind_of(output)
+    count, rate = _timing(KINDS[kind].moving, frames, fps, seconds, output)
+    paper = _background(background, KINDS[kind].transparent)
+    samples = samples or (1 if mode in ("depth", "parts") else 2)
+    if size[0] * size[1] * samples**2 > MOST_RAYS:
+        raise InputError("--size", f"{size[0]} {size[1]} with {samples} samples a side", "give less of either")
+    check_pictures(output, overwrite, size, paper is None)
+    if report is not None:
+        check_report(report, overwrite)
+    if sun is not None and not sun.up:
+        log.info("the sun is %.1f° below the horizon: only the sky's light is left", -sun.elevation_deg)
+    request = Request(
+        mode, wanted, size, yaw, pitch, samples, paper, ground,
+        towards_sun(sun, bearing) if sun is not None and sun.up else None,
+        outline_width, _colour("--outline-colour", outline_colour),
+    )  # fmt: skip
+
+    start = time.perf_counter()
+    if fields:
+        figure = read_figure(source, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
+        settings = settings_for(
+            quality, parts=parts, textures=textures, contours=contours, device=torch_device(device), seed=seed
+        )
+        if mode == "textured" and settings.textures == "none":
+            raise InputError("--textures", "none, but --mode textured shows them", "use another --mode")
+        scene: Scene = field_scene(figure, settings, request)
+    else:
+        scene = _mesh_scene(source, request)
+    ready = time.perf_counter()
+    total = _Total()
+    written = write_pictures(output, _turntable(scene, request, count, total), rate, overwrite)
+    done = time.perf_counter()
+    if report is not None:
+        facts = _facts(source, output, request, scene, total, sun)
+        facts["seconds"] = {"scene": round(ready - start, 3), "pictures": round(done - ready, 3)}
+        facts["files"] = [path.name for path in written]
+        write_text(report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
+    log.info("%s", output)
+
+
+def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Iterator[ByteArray]:
+    """`count` pictures of a full turn, the first as asked for."""
+    for index in range(count):
+        picture = render(scene, replace(request, yaw_deg=request.yaw_deg + 360.0 * index / count))
+        total.counts += picture.counts
+        total.pictures += 1
+        log.debug("picture %d of %d", index + 1, count)
+        yield picture.rgba
+
+
+def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldScene:
+    """The part fields of a figure and, where the request shows them, its colours; nothing is meshed."""
+    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.parts.pieces import clean
+    from fig2mesh.parts.smooth_union import smooth_union
+    from fig2mesh.pipeline import Step, steps
+
+    figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+    textures = needs(request.mode, request.effects).textures
+    results: dict[str, Any] = {"figure": figure, "pieces": pieces}
+    road = {step.name: step for step in steps(settings, 1.0)}
+
+    def make(step: Step) -> None:
+        for name in step.needs:
+            if name not in results:
+                make(road[name])
+        results[step.name] = step.run(*(results[name] for name in step.needs))
+
+    for goal in ("body", "textures") if textures else ("body",):
+        make(road[goal])
+    body = results["body"]
+    if "smooth-union" in request.effects:
+        body = smooth_union(body, results["parts"].canvas)
+    return FieldScene(body, results.get("textures"), image_frame(figure))
+
+
+def _mesh_scene(path: Path, request: Request) -> MeshScene:
+    if not path.is_file():
+        raise FigureError(path, "no such file", "check the path of the model")
+    mesh = read_model(path)
+    if not len(mesh.faces):
+        raise FigureError(path, "no triangles", "give another model")
+    if request.mode == "textured" and mesh.texture is None and mesh.colors is None:
+        raise FigureError(path, "has no colours", "use --mode clay")
+    if request.mode == "parts" and mesh.parts is None:
+        raise FigureError(path, "does not say which part is where", "use a GLB made without --no-evidence")
+    return MeshScene(mesh)
+
+
+def _sun(effects: frozenset[Effect], lonlat: tuple[float, float] | None, text: str | None) -> Sun | None:
+    if "sun" not in effects:
+        for name, value in (("--lonlat", lonlat), ("--time", text)):
+            if value is not None:
+                raise InputError(name, "only the effect sun asks for it", "add --effects sun, or leave it out")
+        return None
+    if lonlat is None:
+        raise InputError("--effects", "sun without a place", "pass --lonlat LON LAT")
+    if text is None:
+        raise InputError("--effects", "sun without a time", "pass --time 2026-06-21T14:00+02:00")
+    check_lonlat(*lonlat)
+    return sun_at(*lonlat, parse_time(text))
+
+
+def _timing(
+    moving: bool, frames: int | None, fps: float | None, seconds: float | None, output: str
+) -> tuple[int, float]:
+    """Number of pictures, and how many a second; any two of the three options say the third."""
+    if not moving:
+        if (frames or 1) != 1 or fps is not None or seconds is not None:
+            found = "a .png is one picture, without --frames, --fps, --seconds"
+            raise InputError(output, found, "use .webp, .gif, .mp4 or a folder")
+        return 1, FPS
+    if frames is not None and fps is not None and seconds is not None:
+        raise InputError("--seconds", "given with --frames and --fps", "give two of the three")
+    if seconds is not None:
+        count = frames or max(1, round(seconds * (fps or FPS)))
+        rate = count / seconds
+    else:
+        count, rate = frames or FRAMES, fps or FPS
+    if count > 10_000 or not 0.01 <= rate <= 100:
+        raise InputError("--seconds", f"{count} pictures, {rate:g} a second", "ask for at most 10000, and 100 a second")
+    return count, rate
+
+
+def _background(text: str | None, transparent: bool) -> Colour | None:
+    if text is None:
+        return None if transparent else (255, 255, 255)
+    return None if text.strip().lower() == "transparent" else _colour("--background", text)
+
+
+def _colour(option: str, text: str) -> Colour:
+    try:
+        red, green, blue = ImageColor.getrgb(text)[:3]
+    except ValueError:
+        raise InputError(option, f"{text!r} is no colour", "give a name such as ivory, or #rrggbb") from None
+    return red, green, blue
+
+
+def _facts(source: Path, output: str, request: Request, scene: Scene, total: _Total, sun: Sun | None) -> dict[str, Any]:
+    view = view_of(scene, request)
+    return {
+        "input": source.name,
+        "output": Path(output).name,
+        "surface": "fields" if isinstance(scene, FieldScene) else "mesh",
+        "mode": request.mode,
+        "effects": sorted(request.effects),
+        "size": list(request.size),
+        "samples": request.samples,
+        "pictures": total.pictures,
+        "height_shown": view.height * scene.unit,
+        "depth": {"white_at": view.near * scene.unit, "black_at": view.far * scene.unit},
+        "needs": asdict(needs(request.mode, request.effects, fields=isinstance(scene, FieldScene))),
+        "counts": asdict(total.counts),
+        "sun": None if sun is None else {"azimuth_deg": sun.azimuth_deg, "elevation_deg": sun.elevation_deg},
+    }

@@ -1,0 +1,112 @@
+"""Light and shade of points, as formulas of arrays; light is added up linearly (IEC 61966-2-1), not as sRGB."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fig2mesh.field.camera import axes
+
+Floats = NDArray[np.float64]
+
+AMBIENT, FILL, KEY = 0.10, 0.24, 0.88
+"""Shares of white light: from everywhere, soft from one side, and of the lamp at right angles. A white wall facing the
+viewer of `light` comes to 0.85: drawings keep most of their brightness, and only what faces the lamp clips."""
+
+KEY_LIGHT = (-0.50, 0.62, 0.60)
+"""Towards the lamp: right and up as seen, and towards the viewer, over level ground whatever the camera's pitch."""
+
+FILL_LIGHT = (0.55, 0.10, 0.83)
+"""Towards the middle of the soft fill of `light`, likewise; that of `sun` is the sky."""
+
+HEAD_LIGHT = (-0.30, 0.45, 0.84)
+"""Of clay without any light asked for: turns with the camera in every way."""
+
+CLAY = (206.0, 190.0, 174.0)
+GROUND = (232.0, 230.0, 226.0)
+
+PART_COLOURS: tuple[tuple[int, int, int], ...] = (
+    (160, 160, 160), (203, 171, 96), (233, 150, 122),
+    (76, 145, 203), (118, 190, 98), (44, 104, 168), (74, 150, 62), (144, 196, 232), (170, 224, 150),
+    (132, 104, 188), (206, 104, 148), (98, 68, 156), (168, 62, 110), (180, 158, 222), (236, 164, 194),
+    (120, 80, 50), (70, 160, 160), (96, 96, 104),
+)  # fmt: skip
+"""sRGB of each part label: one hue each for a side's arm and leg, darker downwards, light hands and feet."""
+
+
+def key_direction(yaw_deg: float) -> Floats:
+    """(3,) unit vector towards the lamp of `light`, seen from a camera at this yaw."""
+    return _from_view(KEY_LIGHT, yaw_deg, 0.0)
+
+
+def fill_direction(yaw_deg: float) -> Floats:
+    """(3,) unit vector towards the middle of the fill of `light`."""
+    return _from_view(FILL_LIGHT, yaw_deg, 0.0)
+
+
+def _from_view(direction: Any, yaw_deg: float, pitch_deg: float) -> Floats:
+    vector = np.asarray(direction, np.float64) @ axes(yaw_deg, pitch_deg)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def light_of(normals: Floats, lamp: Floats | None, fill: Floats, reached: Any = 1.0, openness: Any = 1.0) -> Floats:
+    """(N,) linear light on points: lambert's law for the lamp, half of it wrapped round the form for the fill.
+
+    normals : (N, 3) unit; lamp, fill : (3,) unit, towards them; no lamp: None
+    reached : (N,) 1 where the lamp's rays arrive, 0 in shadow
+    openness : (N,) share of the hemisphere that light from everywhere comes in through
+    """
+    soft = AMBIENT + FILL * (0.5 + 0.5 * normals @ fill)
+    direct = 0.0 if lamp is None else KEY * np.maximum(normals @ lamp, 0.0) * reached
+    return np.asarray(soft * openness + direct, np.float64)
+
+
+def head_light(normals: Floats, yaw_deg: float, pitch_deg: float) -> Floats:
+    """(N,) linear light on clay nobody lights: soft, so that no side of the form falls into black."""
+    half = 0.5 + 0.5 * normals @ _from_view(HEAD_LIGHT, yaw_deg, pitch_deg)
+    return np.asarray(0.1 + 0.95 * half**2, np.float64)
+
+
+def lit(colours: Floats, light: Floats) -> Floats:
+    """(N, 3) sRGB 0-255 of surfaces of these colours (N, 3) in so much linear light (N,)."""
+    return encode(np.minimum(decode(colours) * light[:, None], 1.0))
+
+
+def decode(colours: Floats) -> Floats:
+    """Linear light 0-1 of sRGB 0-255, not rounded to bytes."""
+    srgb = colours / 255.0
+    return np.asarray(np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4))
+
+
+def encode(linear: Floats) -> Floats:
+    """sRGB 0-255 of linear light 0-1, not rounded to bytes."""
+    return 255.0 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def hemisphere(normals: Floats, count: int, turns: Floats) -> Floats:
+    """(N, count, 3) directions around normals (N, 3), as dense as their share of the light, so that plain means do.
+
+    turns : (N,) in [0, 1), by how much of a full turn each set is turned about its normal
+    """
+    index = np.arange(count) + 0.5
+    radius, rise = np.sqrt(index / count), np.sqrt(1.0 - index / count)
+    # A golden angle apart (Vogel's spiral): even in the disc, hence cosine-weighted on the hemisphere (Malley).
+    angle = 2 * np.pi * (turns[:, None] + 0.618033988749895 * np.arange(count))
+    # An orthonormal basis without branches: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".
+    x, y, z = normals.T
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    second = np.stack([b, sign + y * y * a, -y], axis=1)
+    across, along = radius * np.cos(angle), radius * np.sin(angle)
+    return np.asarray(
+        across[..., None] * first[:, None] + along[..., None] * second[:, None] + rise[:, None] * normals[:, None]
+    )
+
+
+def turns_at(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> Floats:
+    """(N,) in [0, 1): interleaved gradient noise of pixels (Jimenez 2014): neighbours differ as much as they can."""
+    return np.asarray((52.9829189 * ((0.06711056 * columns + 0.00583715 * rows) % 1.0)) % 1.0)

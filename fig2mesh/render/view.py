@@ -1,0 +1,78 @@
+"""Where the camera stands: one place for all pictures of a turntable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fig2mesh.field.camera import axes, orthographic, perspective
+from fig2mesh.records import Rays
+
+MARGIN = 0.05
+"""Free border on each side, share of the picture."""
+
+NEARBY = 2.2
+"""The camera of `perspective` stands so many figures away: a man at four metres, the field of view 30 degrees."""
+
+GROUND_RADIUS = 0.36
+"""Of the ground's disc, share of the figure's height; or as far as the figure reaches, and a tenth more."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera that turns about the vertical axis through the middle of a figure, which never leaves the picture.
+
+    centre : (3,) looked at; height : shown in the plane through it; distance : of the camera from it
+    near, far : distances from the camera's plane between which the figure lies
+    """
+
+    centre: tuple[float, float, float]
+    height: float
+    distance: float
+    near: float
+    far: float
+    perspective: bool
+
+    def rays(self, yaw_deg: float, pitch_deg: float, size: tuple[int, int], rows: tuple[int, int]) -> Rays:
+        """Rays of the picture's rows `rows`."""
+        camera = perspective if self.perspective else orthographic
+        return camera(
+            yaw_deg, pitch_deg, size=size, height=self.height, centre=self.centre, distance=self.distance, rows=rows
+        )
+
+
+def ground_radius(bounds: NDArray[np.float64]) -> float:
+    """Of the disc that a figure with these bounds (2, 3) stands on."""
+    half = (bounds[1] - bounds[0]) / 2
+    return float(max(GROUND_RADIUS * 2 * half[1], 1.1 * np.hypot(half[0], half[2])))
+
+
+def make_view(bounds: Any, size: tuple[int, int], pitch_deg: float, *, nearby: bool, ground: bool) -> View:
+    """The camera for a figure in a box (2, 3), for every yaw.
+
+    nearby : perspective; ground : show the disc below it as well
+    """
+    box = np.asarray(bounds, np.float64)
+    half = (box[1] - box[0]) / 2
+    radius = float(np.hypot(half[0], half[2]))
+    if ground:
+        radius = max(radius, ground_radius(box))
+    # The upright cylinder around all that can come into the picture: its two rims, as they look from this pitch.
+    angle = np.linspace(0.0, 2 * np.pi, 181)
+    rim = np.stack([radius * np.cos(angle), 0 * angle, radius * np.sin(angle)], axis=1)
+    figure = float(np.hypot(half[0], half[2])) / radius
+    corners = np.concatenate([rim * (figure, 1, figure) + (0, half[1], 0), rim - (0, half[1], 0)])
+    across, up, towards = (corners @ axes(0.0, pitch_deg).T).T
+    distance = 2.0 * float(np.hypot(half[1], radius))
+    if nearby:
+        distance = NEARBY * max(2 * float(half[1]), 2 * radius)
+        larger = distance / (distance - towards)
+        across, up = across * larger, up * larger
+    width, height = size
+    shown = 2 * max(float(np.abs(up).max()), float(np.abs(across).max()) * height / width) / (1 - 2 * MARGIN)
+    reach = float(towards.max())
+    x, y, z = box.mean(axis=0).tolist()
+    return View((x, y, z), shown, distance, distance - reach, distance + reach, nearby)
