@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Train what textures need, and what their tables compare it with: two lanes at once, one core each, 75 minutes.
+# Train what textures need, and what their tables compare it with: two lanes at once, one core each, 140 minutes.
 #   docs/train_textures.sh DATA RUNS
 # Run again after an interruption: what is done is done, what was cut off goes on.
 set -euo pipefail
@@ -10,6 +10,7 @@ mkdir -p "$RUNS"
 
 first() {
   $TRAIN uv --data "$DATA" --budget 40 -o "$RUNS/uv-masks"
+  $TRAIN uv --data "$DATA" --init "$RUNS/uv-masks" --lr 1.5e-3 --budget 75 -o "$RUNS/uv-masks-more"
   $TRAIN uv --data "$DATA" --no-masks --budget 25 -o "$RUNS/uv-depth"
 }
 
