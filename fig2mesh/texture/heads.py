@@ -17,8 +17,17 @@ FACE_SHARE = 1.05
 LEAST_HAIR = 0.04
 """Share of the head that hair or hat must have to be carried on over its back."""
 
-SHADE = 45.0
-"""Colours of a head nearer to each other than this (RGB 0-255) are light and shade of one thing."""
+SHADE = 18.0
+"""Colours of a head nearer to each other than this (CIELAB units) are light and shade of one thing."""
+
+CHEEKS = (0.3, 0.7)
+"""Where temples and cheeks begin and end, shares of the height of the face."""
+
+BRIM = 1.6
+"""Hats are so much wider than faces."""
+
+FILLED = 0.4
+"""Share of an area that must have its colour: mixed rims of lines dominate where nothing else does."""
 
 HAIRLINE = 0.55
 """Height of the hairline above the eyes relative to the head's half width."""
@@ -69,33 +78,42 @@ def back_of_head(
     palette : (K, 3) 0-255; index : (h, w) palette colour of each pixel; weight : (K,) small for colours of strokes
     line : width of a contour, pixels; radius : how far beside the face its hair is looked for, pixels
     """
-    colours = _area_colours(palette, index, head, weight, line)
+    colours = _area_colours(palette, kind, index, head, weight, line)
     if not len(colours):
         return kind
     known = colours >= 0
     _, source = ndimage.distance_transform_edt(~(head & known[kind]), return_indices=True)
     areas = colours[kind[tuple(source)]] if (head & known[kind]).any() else kind
     face = face & head
-    around = head & ~face & known[index]
+    around = head & ~face & known[kind]
     if not face.any() or not around.any():
         return np.where(head, areas, kind)
-    few = np.where(known[index], colours[index], 0)
-    skin = int(np.argmax(np.bincount(few[face & known[index]], minlength=len(palette))))
+    few = np.where(known[kind], colours[kind], 0)
+    skin = int(np.argmax(np.bincount(few[face & known[kind]], minlength=len(palette))))
     hair = around & (few != skin)
     if hair.sum() < LEAST_HAIR * head.sum():
         hair = around
-    # Right beside the face there is hair; above it there may be a hat, further out a rucksack.
-    for square in (np.ones((1, 2 * int(radius) + 1)), np.ones((2 * int(radius) + 1,) * 2)):
-        near = hair & ndimage.binary_dilation(face, square)
-        if near.sum() >= LEAST_HAIR / 2 * head.sum():
-            hair = near
-            break
+    # Right beside cheeks and temples there is hair; above there may be a hat, below a scarf, further out a rucksack.
+    rows = np.flatnonzero(face.any(axis=1))
+    cheeks = face.copy()
+    cheeks[: int(np.quantile(rows, CHEEKS[0]))] = cheeks[int(np.quantile(rows, CHEEKS[1])) :] = False
+    wide = 2 * int(radius) + 1
+    beside = hair & ndimage.binary_dilation(cheeks, np.ones((1, wide)))
+    over = hair & ndimage.binary_dilation(face, np.ones((wide, wide)))
+    if beside.sum() >= LEAST_HAIR / 4 * head.sum():
+        hair = beside
+    elif np.ptp(np.flatnonzero(hair.any(axis=0))) > BRIM * np.ptp(np.flatnonzero(face.any(axis=0))):
+        # A hat with a brim and no hair: a bare neck, not a hood.
+        return np.where(face, skin, np.where(head, areas, kind))
+    elif over.sum() >= LEAST_HAIR / 2 * head.sum():
+        hair = over
     hue = int(np.argmax(np.bincount(few[hair], minlength=len(palette))))
     return np.where(face, hue, np.where(head, areas, kind))
 
 
 def _area_colours(
     palette: NDArray[np.float32],
+    kind: NDArray[np.int_],
     index: NDArray[np.int_],
     own: NDArray[np.bool_],
     weight: NDArray[np.float64],
@@ -105,15 +123,21 @@ def _area_colours(
 
     Empty where no colour has an area.
     """
-    count = np.bincount(index[own], minlength=len(palette))
+    from skimage.color import rgb2lab
+
+    lab = rgb2lab(palette / 255.0)
+    count = np.bincount(kind[own], minlength=len(palette))
     result = np.full(len(palette), -1)
     for colour in np.argsort(-count, kind="stable"):
-        area = own & (index == colour)
+        area = own & (kind == colour)
         if count[colour] < LEAST_HAIR * own.sum() or weight[colour] <= STROKE:
             continue
         if ndimage.distance_transform_edt(area).max() <= max(line, 1.0):
             continue
+        alike = np.flatnonzero(np.linalg.norm(lab - lab[colour], axis=1) < SHADE)
+        if np.isin(index[area], alike).mean() < FILLED:
+            continue
         larger = np.flatnonzero(result == np.arange(len(palette)))
-        near = np.linalg.norm(palette[larger] - palette[colour], axis=1) < SHADE
+        near = np.isin(larger, alike)
         result[colour] = larger[near][0] if near.any() else colour
     return result if (result >= 0).any() else result[:0]
