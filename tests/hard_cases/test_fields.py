@@ -331,3 +331,21 @@ def test_tiny_and_huge_figures(worst: Worst, exponent: int, seed: int) -> None:
     assert (plain.hit != scaled.hit).mean() <= 0.01
     facing = -(plain.normals * rays.directions).sum(axis=1)
     worst(gap(scaled.depth / scale, plain.depth)[both & (facing > 0.1)].max(initial=0.0))
+
+
+@hard_case(
+    "a field in units of its own: all values times 1e-30 to 1e30",
+    "the hits of the field itself",
+    "the zero level does not depend on the values' unit; float32 rounds each value once",
+    5e-6,
+)
+@given(st.integers(-30, 30), seeds)
+@drawn(20)
+def test_values_of_any_magnitude(worst: Worst, exponent: int, seed: int) -> None:
+    part, rays = limb(32), random_rays(200, seed)
+    values = (part.grid.astype(np.float64) * 10.0**exponent).astype(np.float32)
+    plain = trace(Body((part,)), rays, tolerance=1e-6)
+    scaled = trace(Body((PartSdf(part.part, values, part.centre, part.edge),)), rays, tolerance=1e-6)
+    facing = -(plain.normals * rays.directions).sum(axis=1)
+    worst(gap(scaled.depth, plain.depth)[facing > 0.1].max(initial=0.0))
+    assert (plain.hit != scaled.hit).mean() <= 0.01
