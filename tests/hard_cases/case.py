@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,8 @@ def drawn(examples: int) -> settings:
         derandomize=True,
         deadline=None,
         database=None,
+        # Making a failing figure smaller would take many minutes and explain little.
+        phases=(Phase.explicit, Phase.generate),
         # `worst` is one for all examples of a property, which is what it is for.
         suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
     )

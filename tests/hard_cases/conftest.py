@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.hard_cases.case import Case, Worst
+from tests.hard_cases.figures import Job
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -21,3 +23,8 @@ def worst(request: pytest.FixtureRequest) -> Iterator[Worst]:
     measured = Worst(case)
     yield measured
     request.node.user_properties.append(("hard_case", (request.node.originalname, case, measured.value)))
+
+
+@pytest.fixture
+def job(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Job:
+    return Job(tmp_path, capfd)

@@ -107,9 +107,9 @@ def table(rows: list[Row]) -> str:
     lines = [
         "# Hard cases",
         "",
-        "Written by `python -m tests.hard_cases.table docs/hard_cases.md`, which runs `tests/hard_cases`; the last column",
-        "is what that run measured, the largest value over all inputs. Lengths are figure units (a figure is 1.79 high)",
-        "where no other unit is named.",
+        "Written by `python -m tests.hard_cases.table docs/hard_cases.md`, which runs `tests/hard_cases`; the last",
+        "column is what that run measured, the largest value over all inputs. Lengths are figure units (a figure is",
+        "1.79 high) where no other unit is named.",
     ]
     for module, title in SECTIONS.items():
         lines += ["", f"## {title}", "", f"`tests/hard_cases/{module}.py`", ""]

@@ -145,8 +145,8 @@ def test_all_positive_grids(seed: int, exponent: int) -> None:
 @hard_case(
     "a cube whose every node is negative, values from −1e-30 to −1e30, any place and size",
     "rays hit the cube's faces; its mesh is closed and as large as the cube",
-    "depth: float32 of a ray from 3 units away. A jump says nothing of its place between nodes, so the mesh has each face "
-    "within a cell of 1/12: (1 + 2/12)³ − 1 of the volume",
+    "depth: float32 of a ray from 3 units away. A jump says nothing of its place between nodes, so the mesh has each "
+    "face within a cell of 1/12: (1 + 2/12)³ − 1 of the volume",
     0.59,
     "of the volume",
 )
