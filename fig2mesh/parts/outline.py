@@ -30,8 +30,8 @@ OVERLAP = 0.025
 """How far neighbouring parts of one layer reach into each other, FIGURE units."""
 
 CUT_BLUR_PX = 2.0
-"""Smoothing of the cuts between parts, pixels. It moves the cut of a part one pixel wide by 1.3 pixels, so that parts on
-a coarse canvas overlap by more pixels than that."""
+"""Smoothing of the cuts between parts, pixels. It moves the cut of a part one pixel wide by 1.3 pixels: on a coarse
+canvas parts overlap by more than that."""
 
 THIN = 0.75
 """Largest grid spacing relative to the half thickness of a part."""
