@@ -96,8 +96,8 @@ def make_sources(
     if not labels.any():
         # A figure thinner than a pixel of the plain pictures lies between their centres.
         shown = outline.split.labels > 0
-        pixels = frame.image_from_figure(outline.canvas.points()[shown])[:, ::-1] / factor
-        row, column = np.clip(np.floor(pixels).astype(int), 0, np.array(labels.shape) - 1).T
+        at = frame.image_from_figure(outline.canvas.points()[shown])[:, ::-1] / factor
+        row, column = np.clip(np.floor(at).astype(int), 0, np.array(labels.shape) - 1).T
         labels[row, column] = outline.split.labels[shown]
     palette, index = _palette(small, labels > 0, seed)
     pitch = frame.units_per_px * factor
