@@ -23,7 +23,7 @@ from tests.hard_cases.figures import FAST, SMALL, Job, refused
     "the outline runs through coverage of pixels: rounding loses up to a fifth of a corner pixel, and of so few pixels "
     "most are corners",
     0.3,
-    "1 − IoU",
+    "(1 − IoU)",
 )
 def test_pictures_of_sixteen_pixels(job: Job, worst: Worst, width: int, height: int) -> None:
     made = job(np.asarray(draw_figure(2).resize((width, height), Image.Resampling.BOX)))

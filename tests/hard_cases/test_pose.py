@@ -39,7 +39,7 @@ def one_solid(figure: Figure, worst: Worst) -> None:
 @given(places)
 @drawn(2)
 @hard_case(
-    "all 21 joints in one point, anywhere on the picture", "one closed solid of the drawn outline", WHY, LOST, "1 − IoU"
+    "all 21 joints in one point, anywhere on the picture", "one closed solid of the drawn outline", WHY, LOST, "(1 − IoU)"
 )
 def test_all_joints_in_one_point(worst: Worst, place: tuple[float, float]) -> None:
     one_solid(figure_of(MASK, {name: [*place, 1] for name in JOINT_NAMES}), worst)
@@ -52,7 +52,7 @@ def test_all_joints_in_one_point(worst: Worst, place: tuple[float, float]) -> No
     "one closed solid of the drawn outline",
     WHY,
     LOST,
-    "1 − IoU",
+    "(1 − IoU)",
 )
 def test_pairs_of_joints_in_one_point(worst: Worst, pairs: list[tuple[str, str]]) -> None:
     one_solid(figure_of(MASK, {**PLAIN, **{first: PLAIN[second] for first, second in pairs}}), worst)
@@ -60,7 +60,7 @@ def test_pairs_of_joints_in_one_point(worst: Worst, pairs: list[tuple[str, str]]
 
 @given(st.integers(0, 179))
 @drawn(4)
-@hard_case("all joints on one line, at any angle", "one closed solid of the drawn outline", WHY, LOST, "1 − IoU")
+@hard_case("all joints on one line, at any angle", "one closed solid of the drawn outline", WHY, LOST, "(1 − IoU)")
 def test_collinear_joints(worst: Worst, angle: int) -> None:
     along = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
     middle = np.array([100.0, 150.0])
@@ -78,14 +78,14 @@ def test_collinear_joints(worst: Worst, angle: int) -> None:
     "one closed solid of the drawn outline",
     WHY,
     LOST,
-    "1 − IoU",
+    "(1 − IoU)",
 )
 def test_joints_off_the_silhouette(worst: Worst, where: list[tuple[float, float]], seen: list[bool]) -> None:
     joints = {name: [*place, int(shown)] for name, place, shown in zip(JOINT_NAMES, where, seen, strict=True)}
     one_solid(figure_of(MASK, joints), worst)
 
 
-@hard_case("no joint visible", "one closed solid of the drawn outline", WHY, LOST, "1 − IoU")
+@hard_case("no joint visible", "one closed solid of the drawn outline", WHY, LOST, "(1 − IoU)")
 def test_all_joints_hidden(worst: Worst) -> None:
     one_solid(figure_of(MASK, joints_on(200, 300, visible=0)), worst)
 
@@ -151,7 +151,7 @@ def test_joints_outside_of_the_picture(job: Job, where: str) -> None:
     "one closed solid of the drawn outline",
     WHY,
     LOST,
-    "1 − IoU",
+    "(1 − IoU)",
 )
 def test_joints_on_the_edge_of_the_picture(worst: Worst, x: float, name: str) -> None:
     one_solid(figure_of(MASK, {**PLAIN, name: [max(x, 0.0), 10.0, 1]}), worst)

@@ -100,7 +100,7 @@ def test_hard_silhouettes(job: Job, name: str) -> None:
     "closed as drawn, genus 1, and the silhouette without the hole",
     "a thin ring is drawn 14 mm wide instead of 10 to be held, and its contour is known to a pixel of the canvas",
     0.35,
-    "1 − IoU",
+    "(1 − IoU)",
 )
 def test_rings_keep_their_hole(job: Job, worst: Worst, width: int) -> None:
     made = job(painted(ring(95 - width, 95)))
