@@ -11,10 +11,6 @@ from tests.hard_cases.case import Case, Worst
 from tests.hard_cases.figures import Job
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "hard_case(case): see tests/hard_cases/case.py")
-
-
 @pytest.fixture(autouse=True)
 def worst(request: pytest.FixtureRequest) -> Iterator[Worst]:
     mark = request.node.get_closest_marker("hard_case")

@@ -39,7 +39,11 @@ def one_solid(figure: Figure, worst: Worst) -> None:
 @given(places)
 @drawn(2)
 @hard_case(
-    "all 21 joints in one point, anywhere on the picture", "one closed solid of the drawn outline", WHY, LOST, "(1 − IoU)"
+    "all 21 joints in one point, anywhere on the picture",
+    "one closed solid of the drawn outline",
+    WHY,
+    LOST,
+    "(1 − IoU)",
 )
 def test_all_joints_in_one_point(worst: Worst, place: tuple[float, float]) -> None:
     one_solid(figure_of(MASK, {name: [*place, 1] for name in JOINT_NAMES}), worst)
