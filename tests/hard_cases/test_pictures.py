@@ -45,6 +45,7 @@ def test_a_picture_of_one_pixel(job: Job) -> None:
 BARS = [(4000, 20), (20, 4000), (3000, 2)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("width", "height"), BARS)
 @hard_case(
     "bars of " + ", ".join(f"{w} × {h}" for w, h in BARS) + " pixels, the whole picture being the figure",

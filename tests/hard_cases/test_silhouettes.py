@@ -30,7 +30,7 @@ def closed_as_drawn(measures: dict) -> None:
     assert measures["components"] == measures["pieces_drawn"]
 
 
-@pytest.mark.parametrize(("width", "head"), [(1, 0.1), (1, 0.2), (3, 0.2)])
+@pytest.mark.parametrize(("width", "head"), [pytest.param(1, 0.1, marks=pytest.mark.slow), (1, 0.2), (3, 0.2)])
 @hard_case(
     "a head of 1/5 or 2/5 of the height on limbs of 1 and 3 pixels, 3 and 9 mm of a figure 1.79 m high",
     "one closed solid; its arms and legs reach as far as they are drawn",
