@@ -63,7 +63,7 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
         return road(figure, image_frame(figure))
 
     def infer_parts(figure: Figure, pose: Pose3D) -> Outline:
-        canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, 0.9 * settings.voxel)
+        canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, settings.voxel)
         infer = None
         if settings.parts != "outline":
             infer = part_inference(pose, settings.part_nodes, settings.device, settings.precision)

@@ -230,7 +230,7 @@ def assemble(
     for name, depth in (depths or {}).items():
         joints[JOINT[name], 2] = depth
     pose = Pose3D(joints)
-    canvas = make_canvas(figure, frame, canvas_px, 0.9 * voxel)
+    canvas = make_canvas(figure, frame, canvas_px, voxel)
     outline = outline_parts(canvas, pose, figure.visible, voxel=voxel, infer=infer)
     body = Body(outline.parts, fillets=outline.fillets)
     return Assembled(figure, frame, pose, outline, body, isosurface(body, spacing=voxel))

@@ -20,13 +20,14 @@ def lipschitz(grid: FloatArray, spacing: float, *, outside: bool = False) -> flo
     Inside a cell each partial derivative is a mean of the differences along the cell's four edges of that direction,
     so no slope exceeds the largest of them; that holds for any values, distances or not.
     """
-    squares = np.zeros(tuple(n - 1 for n in grid.shape), np.float32)
+    steepest = np.zeros(tuple(n - 1 for n in grid.shape), np.float32)
     for axis in range(3):
         slope = np.abs(np.diff(grid, axis=axis))
-        squares += _over_corners(slope, [other for other in range(3) if other != axis]) ** 2
+        # Squares of distances in other units than ours would leave float32's range: at 1e-23 they vanish.
+        np.hypot(steepest, _over_corners(slope, [other for other in range(3) if other != axis]), out=steepest)
     if outside:
-        squares[_over_corners(grid, [0, 1, 2]) <= 0] = 0
-    return float(np.sqrt(squares.max(), dtype=np.float64) * (1 + 1e-6) / spacing)
+        steepest[_over_corners(grid, [0, 1, 2]) <= 0] = 0
+    return float(steepest.max()) * (1 + 1e-6) / spacing
 
 
 def _over_corners(values: FloatArray, axes: list[int]) -> FloatArray:

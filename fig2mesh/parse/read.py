@@ -15,6 +15,9 @@ from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray, Figu
 MAX_PIXELS = 178_956_970
 """Twice Pillow's warning level: decoding more would need gigabytes."""
 
+BAND_PX = 512
+"""Rows that are converted to RGBA at a time."""
+
 JOINT_SLACK_PX = 1.0
 """Joints may lie on the picture's edge; rounding by annotation tools puts them up to a pixel outside."""
 
@@ -95,7 +98,8 @@ def _open(path: Path, what: str) -> Image.Image:
                 found = f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx"
                 raise FigureError(path, found, "cut the figure out of the sheet first")
             image.load()
-            return ImageOps.exif_transpose(image)
+            ImageOps.exif_transpose(image, in_place=True)
+            return image
     except FigureError:
         raise
     except Image.DecompressionBombError:
@@ -117,7 +121,13 @@ def _read_rgba(path: Path) -> ByteArray:
         values = np.asarray(image, np.float64)
         top = 65535.0 if values.max() > 255 else 255.0
         image = Image.fromarray(np.clip(values / top * 255.0, 0, 255).astype(np.uint8))
-    return np.asarray(image.convert("RGBA"))
+    # In bands, as Pillow would keep two more copies of the whole picture meanwhile.
+    width, height = image.size
+    rgba = np.empty((height, width, 4), np.uint8)
+    for top in range(0, height, BAND_PX):
+        bottom = min(top + BAND_PX, height)
+        rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
+    return rgba
 
 
 def _read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:

@@ -27,6 +27,10 @@ PINHOLE = 0.005
 HAIR_PX = 0.9
 """Half the width of the thinnest stroke, pixels of the contour's raster."""
 
+HELD = 1.4
+"""Strokes are drawn at least this many nodes of the part grids and pixels of the canvas wide. At 0.9 limbs of one drawn
+pixel fell into dozens of beads: with a radius of less than 0.6 of a node's distance, a slanted tube passes between."""
+
 
 @dataclass(frozen=True)
 class Canvas:
@@ -68,10 +72,11 @@ class Canvas:
         return np.asarray(flat).reshape(rows.shape[:-1])
 
 
-def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: float = 0.0) -> Canvas:
+def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, voxel: float = 0.0) -> Canvas:
     """The silhouette of a figure, resampled so that its longer side has `longest_px` pixels.
 
-    Strokes narrower than `thinnest` (FIGURE units) are drawn that wide: a grid could not hold them.
+    Strokes too thin for the canvas, or for part grids of spacing `voxel` (FIGURE units), are drawn `HELD` times as wide
+    as the coarser of the two.
 
     The contour is located to a fraction of a pixel: distances are measured on a raster of `CONTOUR_PX` and
     interpolated, so that a coarse canvas does not turn a slanted outline into stairs.
@@ -84,13 +89,12 @@ def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, thinnest: fl
         solid = cover >= cover.max()
     solid = _without_pinholes(solid)
     distance = ndimage.gaussian_filter(raster_distance(solid), 0.7)
-    # Smoothing by itself breaks lines of one pixel, hence the least radius.
-    units = frame.units_per_px / scale
-    distance = np.minimum(distance, thicken(solid, max(0.5 * thinnest / units, HAIR_PX)))
-
     rows, columns = np.flatnonzero(solid.any(axis=1)), np.flatnonzero(solid.any(axis=0))
     tall, wide = rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1
     step = max(tall, wide) / longest_px
+    units = frame.units_per_px / scale
+    # Smoothing by itself breaks lines of one pixel, hence the least radius.
+    distance = np.minimum(distance, thicken(solid, max(0.5 * HELD * max(voxel / units, step), HAIR_PX)))
     margin = MARGIN_PX * step
     height, width = (int(np.ceil((length + 2 * margin) / step)) + 1 for length in (tall, wide))
     row = rows[0] - margin + step * np.arange(height)

@@ -220,8 +220,7 @@ def _joined(
 ) -> tuple[LayerSurface, ...]:
     """The surfaces with floating limbs brought back towards the middle of the body until they hold."""
     for attempt in range(ATTEMPTS):
-        half = [np.sqrt(np.maximum(surface.u, 0.0)) for surface in surfaces]
-        loose = floating(half, [surface.z0 for surface in surfaces], canvas.inside)
+        loose = _floating(canvas, surfaces)
         if not loose:
             break
         for index in sorted(loose):
@@ -236,7 +235,16 @@ def _joined(
                 continue
             limbs[index] = limb = replace(limb, depth=share * limb.depth)
             surfaces[index] = make(layers[index], Bones.of(limb))
+    else:
+        if _floating(canvas, surfaces):
+            # Joints that are nowhere near a body bend the core itself out of the plane of the drawing.
+            surfaces = [replace(surface, z0=np.zeros_like(surface.z0)) for surface in surfaces]
     return tuple(surfaces)
+
+
+def _floating(canvas: Canvas, surfaces: list[LayerSurface]) -> set[int]:
+    half = [np.sqrt(np.maximum(surface.u, 0.0)) for surface in surfaces]
+    return floating(half, [surface.z0 for surface in surfaces], canvas.inside)
 
 
 def _grown(canvas: Canvas, layer: Layer) -> Layer:

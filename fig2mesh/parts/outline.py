@@ -29,6 +29,10 @@ from fig2mesh.records import BODY_PARTS, PART, BoolArray, PartSdf, Pose3D
 OVERLAP = 0.025
 """How far neighbouring parts of one layer reach into each other, FIGURE units."""
 
+CUT_BLUR_PX = 2.0
+"""Smoothing of the cuts between parts, pixels. It moves the cut of a part one pixel wide by 1.3 pixels: on a coarse
+canvas parts overlap by more than that."""
+
 THIN = 0.75
 """Largest grid spacing relative to the half thickness of a part."""
 
@@ -93,7 +97,7 @@ def _part_field(
     if here.sum() < 4 or not (surface.u[here] > 0).any():
         return None
     cut = (ndimage.distance_transform_edt(~here) - ndimage.distance_transform_edt(here)) * canvas.pitch
-    cut = ndimage.gaussian_filter(cut, 2.0) - OVERLAP
+    cut = ndimage.gaussian_filter(cut, CUT_BLUR_PX) - max(OVERLAP, 1.25 * CUT_BLUR_PX * canvas.pitch)
     if surface.clip is not None:
         cut = np.maximum(cut, surface.clip)
     solid = (surface.u > 0) & (cut < 0)

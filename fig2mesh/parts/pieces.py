@@ -9,12 +9,15 @@ from PIL import Image
 from scipy import ndimage
 
 from fig2mesh.parse.frame import image_frame
-from fig2mesh.records import Figure
+from fig2mesh.records import BoolArray, ByteArray, Figure
 
 SPECK = 3.0
 """Pieces that are smaller than this many voxels in both directions cannot be told from dirt."""
 
 MARGIN_PX = 4
+
+BAND_PX = 512
+"""Rows that are reduced at a time."""
 
 
 def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]:
@@ -24,13 +27,14 @@ def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]
     so that nothing that follows depends on how much of a sheet lies around the figure, and reduced to about `most_px`
     pixels on its longer side: scans have far more than a texture can show.
     """
-    pieces, count = ndimage.label(figure.mask, np.ones((3, 3)))
+    pieces, _ = ndimage.label(figure.mask, np.ones((3, 3)))
     windows = ndimage.find_objects(pieces)
-    areas = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
+    areas = [np.count_nonzero(pieces[window] == number) for number, window in enumerate(windows, start=1)]
     extent = np.array([max(s.stop - s.start for s in window) for window in windows])
     kept = extent * image_frame(figure).units_per_px >= SPECK * voxel
     kept[np.argmax(areas)] = True
-    mask = figure.mask if kept.all() else np.isin(pieces, np.flatnonzero(kept) + 1)
+    mask = figure.mask if kept.all() else np.concatenate([[False], kept])[pieces]
+    del pieces  # four bytes a pixel of what may be a whole sheet
 
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     low = np.minimum([columns[0], rows[0]], np.floor(figure.joints_px.min(axis=0))) - MARGIN_PX
@@ -38,30 +42,37 @@ def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]
     x0, y0 = np.maximum(low, 0).astype(int)
     x1, y1 = np.minimum(high, figure.mask.shape[::-1]).astype(int)
     window = np.s_[y0:y1, x0:x1]
-    trimmed = replace(
-        figure,
-        rgba=figure.rgba[window],
-        mask=mask[window],
-        joints_px=figure.joints_px - np.array([x0, y0], np.float32),
-        part_labels=np.where(mask[window], figure.part_labels[window], 0),
-    )
-    return _reduced(trimmed, max(trimmed.mask.shape) // most_px), int(kept.sum()), int((~kept).sum())
+    factor = max(y1 - y0, x1 - x0) // most_px
+    joints = figure.joints_px - np.array([x0, y0], np.float32)
+    labels = np.where(mask[window], figure.part_labels[window], 0)
+    rgba, mask = figure.rgba[window], mask[window]
+    if factor > 1:
+        rgba, mask, labels = _reduced(rgba, factor), _reduced_mask(mask, factor), _reduced_labels(labels, factor)
+        joints = np.minimum(joints / factor, np.array(mask.shape[::-1], np.float32))
+        labels = np.where(mask, labels, 0)
+    cut = replace(figure, rgba=rgba, mask=mask, joints_px=joints, part_labels=labels)
+    return cut, int(kept.sum()), int((~kept).sum())
 
 
-def _reduced(figure: Figure, factor: int) -> Figure:
-    """The figure with `factor` pixels a side made one; silhouette and labels by their majority and nearest pixel."""
-    if factor < 2:
-        return figure
-    # With alpha premultiplied, colours of transparent pixels do not bleed into opaque ones.
-    picture = Image.fromarray(figure.rgba).convert("RGBa").reduce(factor).convert("RGBA")
-    cover = np.asarray(Image.fromarray(np.where(figure.mask, np.uint8(255), np.uint8(0))).reduce(factor))
-    mask = cover >= min(128, int(cover.max()))
-    half = factor // 2
-    labels = np.pad(figure.part_labels, ((0, factor), (0, factor)), mode="edge")[half::factor, half::factor]
-    return replace(
-        figure,
-        rgba=np.asarray(picture),
-        mask=mask,
-        joints_px=np.minimum(figure.joints_px / factor, np.array(mask.shape[::-1], np.float32)),
-        part_labels=np.where(mask, labels[: mask.shape[0], : mask.shape[1]], 0),
-    )
+def _reduced(rgba: ByteArray, factor: int) -> ByteArray:
+    """`factor` pixels a side made one, in bands of rows: whole copies of a large scan take gigabytes."""
+    band = factor * max(1, BAND_PX // factor)
+    rows = []
+    for top in range(0, len(rgba), band):
+        # With alpha premultiplied, colours of transparent pixels do not bleed into opaque ones.
+        picture = Image.fromarray(np.ascontiguousarray(rgba[top : top + band])).convert("RGBa")
+        rows.append(np.asarray(picture.reduce(factor).convert("RGBA")))
+    return np.concatenate(rows)
+
+
+def _reduced_mask(mask: BoolArray, factor: int) -> BoolArray:
+    """By majority; where no pixel has one, the fullest ones."""
+    cover = np.asarray(Image.fromarray(np.where(mask, np.uint8(255), np.uint8(0))).reduce(factor))
+    return np.asarray(cover >= min(128, int(cover.max())))
+
+
+def _reduced_labels(labels: ByteArray, factor: int) -> ByteArray:
+    """The label of the pixel in the middle."""
+    half, (height, width) = factor // 2, labels.shape
+    padded = np.pad(labels, ((0, factor), (0, factor)), mode="edge")
+    return padded[half::factor, half::factor][: -(-height // factor), : -(-width // factor)]

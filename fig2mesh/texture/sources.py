@@ -93,6 +93,12 @@ def make_sources(
     points = frame.figure_from_image(np.stack([columns + 0.5, rows + 0.5], axis=-1) * factor)
     where = np.round(outline.canvas.pixels(points)).astype(int)
     labels = _lookup(outline.split.labels, where)
+    if not labels.any():
+        # A figure thinner than a pixel of the plain pictures lies between their centres.
+        shown = outline.split.labels > 0
+        at = frame.image_from_figure(outline.canvas.points()[shown])[:, ::-1] / factor
+        row, column = np.clip(np.floor(at).astype(int), 0, np.array(labels.shape) - 1).T
+        labels[row, column] = outline.split.labels[shown]
     palette, index = _palette(small, labels > 0, seed)
     pitch = frame.units_per_px * factor
     ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)

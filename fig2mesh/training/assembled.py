@@ -205,7 +205,7 @@ def _roads(truth: Truth, ruled: Pose3D, pose: Pose3D) -> dict[str, Body]:
     from fig2mesh.settings import settings_for
 
     settings = settings_for("draft")
-    canvas = make_canvas(truth.figure, image_frame(truth.figure), settings.canvas_px, 0.9 * settings.voxel)
+    canvas = make_canvas(truth.figure, image_frame(truth.figure), settings.canvas_px, settings.voxel)
     infer = part_inference(pose, settings.part_nodes)
     seen, voxel = truth.figure.visible, settings.voxel
     outline = outline_parts(canvas, ruled, seen, voxel=voxel)
