@@ -138,6 +138,7 @@ async function start() {
   }
 
   window.addEventListener('hashchange', () => { readAddress(); request(); });
+  find('controls').open = window.innerWidth >= 640;
   readAddress();
   calibrate();
   draw();
