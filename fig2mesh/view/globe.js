@@ -3,7 +3,8 @@
 
 const STEP = 5; // degrees: views of the figure are this far apart
 const LIKE_SCREEN = [128, 192, 256, 384, 512, 768, 1024]; // pixels an edge
-const MOST_VIEWS = 100; // kept in the texture atlas of a collection, before a new one is begun
+const UNIT = 1024; // CesiumJS rounds a billboard's width to whole metres before it is scaled
+const MOST_PIXELS = 2 ** 24; // of all views that are kept, before they are given up and begun anew
 
 const find = (id) => document.getElementById(id);
 
@@ -47,19 +48,31 @@ async function start() {
   const local = new Cartesian3(z * sin - x * cos, z * cos + x * sin, y);
   const centre = Matrix4.multiplyByPoint(ecefFromEnu, local, new Cartesian3());
 
+  // A view is loaded into the billboard that is hidden, and they change places when it is there: nothing flickers.
   let billboards = null;
-  let billboard = null;
-  const shown = { id: '', yaw: 0, pitch: 0, pixels: 0, views: 0, draws: 0 };
+  let [front, back] = [null, null];
+  let pictures = new Map();
+  const shown = { id: '', yaw: 0, pitch: 0, draws: 0, pending: false };
 
   function begin() {
     if (billboards) scene.primitives.remove(billboards);
     billboards = scene.primitives.add(new Cesium.BillboardCollection({ scene }));
-    billboard = billboards.add({
-      position: centre, sizeInMeters: true, width: scale * edge, height: scale * edge,
+    [front, back] = [0, 1].map(() => billboards.add({
+      position: centre, show: false, sizeInMeters: true, width: UNIT, height: UNIT, scale: (scale * edge) / UNIT,
       horizontalOrigin: Cesium.HorizontalOrigin.CENTER, verticalOrigin: Cesium.VerticalOrigin.CENTER,
-    });
-    shown.views = 0;
-    shown.ids = new Set();
+    }));
+    pictures = new Map();
+  }
+
+  function swap() {
+    if (!shown.pending) return;
+    if (back.ready) {
+      [front, back] = [back, front];
+      Object.assign(front, { show: true });
+      Object.assign(back, { show: false });
+      shown.pending = false;
+    }
+    scene.requestRender();
   }
 
   function picture(pixels) {
@@ -84,22 +97,19 @@ async function start() {
     const pixels = LIKE_SCREEN.find((n) => n >= needed) ?? LIKE_SCREEN.at(-1);
     const id = [yaw, pitch, pixels].join(' ');
     if (id === shown.id) return;
-    if (shown.views >= MOST_VIEWS && !shown.ids.has(id)) begin();
-    Object.assign(view.camera, { yaw, pitch });
-    Object.assign(shown, { id, yaw, pitch, pixels });
-    if (!shown.ids.has(id)) {
-      shown.ids.add(id);
-      shown.views++;
-      billboard.setImage(id, picture(pixels));
-    } else {
-      billboard.setImageId(id);
+    if (!pictures.has(id)) {
+      if ([...pictures.values()].reduce((sum, { width }) => sum + width ** 2, pixels ** 2) > MOST_PIXELS) begin();
+      Object.assign(view.camera, { yaw, pitch });
+      pictures.set(id, picture(pixels));
     }
+    back.setImage(id, pictures.get(id));
+    Object.assign(shown, { id, yaw, pitch, pending: true });
     scene.requestRender();
   }
 
   function home() {
     camera.cancelFlight();
-    const away = 2.6 * scale * edge;
+    const away = 1.5 * scale * edge;
     // From where the nose points to, a little raised.
     const offset = new Cesium.HeadingPitchRange(bearing + Math.PI, Angle.toRadians(-12), away);
     camera.lookAt(centre, offset);
@@ -109,9 +119,10 @@ async function start() {
 
   begin();
   scene.preRender.addEventListener(() => { try { look(); } catch (error) { fail(error); } });
+  scene.postRender.addEventListener(swap);
   find('home').addEventListener('click', home);
   home();
-  window.fig2mesh = { view, viewer, program: view.program, shown, feet, centre, home, billboard: () => billboard };
+  window.fig2mesh = { view, viewer, program: view.program, shown, feet, centre, home };
   document.documentElement.dataset.ready = 'true';
 }
 
