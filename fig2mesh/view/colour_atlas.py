@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ MOST_PX: Final = 1280
 """Longest side of the drawing on a page."""
 
 GAP_PX: Final = 8
-"""Between the drawing and the figure's bounds, so that coarser mipmaps take nothing from beside it."""
+"""Between a picture's edge and what it colours, so that coarser mipmaps take nothing from beside it."""
 
 DEPTH_PX: Final = 768
 """Longest side of the depth map: two pixels or so for each node of a part's grid."""
@@ -63,18 +63,19 @@ class DepthMap:
 NOTHING: Final = -1000.0
 
 
-def colour_atlas(sources: Sources, frame: ImageFrame, bounds: FloatArray) -> ColourAtlas:
-    """The drawing and each different plain picture, cut to the figure's bounds (2, 3) in FIGURE, side by side."""
-    seen = np.clip(np.round(sources.seen), 0, 255).astype(np.uint8)
-    crops = [_crop(seen, 1.0, frame, bounds)]
-    slot_of: dict[int, int] = {}
+def colour_atlas(sources: Sources, frame: ImageFrame, body: Body) -> ColourAtlas:
+    """The drawing and each different plain picture side by side, cut to what they colour."""
+    crops = [_crop(_bytes(sources.seen), 1.0, frame, body.bounds())]
+    boxes, labels = body.grids.boxes, body.labels[body.grids.owners]
     slot_of_label: dict[int, int] = {}
-    for label, picture in sources.plain.items():
-        if id(picture) not in slot_of:  # parts of one layer share a picture
-            slot_of[id(picture)] = len(crops)
-            plain = np.clip(np.round(picture), 0, 255).astype(np.uint8)
-            crops.append(_crop(plain, sources.plain_scale, frame, bounds))
-        slot_of_label[int(label)] = slot_of[id(picture)]
+    # Parts of one layer share a picture.
+    for picture in {id(picture): picture for picture in sources.plain.values()}.values():
+        own = [label for label, other in sources.plain.items() if other is picture]
+        mine = boxes[np.isin(labels, own).any(axis=1) & np.isfinite(boxes).all(axis=(1, 2))]
+        if len(mine):
+            slot_of_label |= dict.fromkeys(own, len(crops))
+            bounds = np.stack([mine[:, 0].min(axis=0), mine[:, 1].max(axis=0)])
+            crops.append(_crop(_bytes(picture), sources.plain_scale, frame, bounds))
     # The drawing's column, then columns of plain pictures below each other.
     height = max(crop.shape[0] for crop, _ in crops)
     x = y = column = 0
@@ -94,10 +95,14 @@ def colour_atlas(sources: Sources, frame: ImageFrame, bounds: FloatArray) -> Col
     return ColourAtlas(atlas, tuple(slots), slot_of_label, min(1, len(slots) - 1))
 
 
+def _bytes(picture: FloatArray) -> ByteArray:
+    return np.clip(np.round(picture), 0, 255).astype(np.uint8)
+
+
 def _crop(
-    picture: ByteArray, scale: float, frame: ImageFrame, bounds: FloatArray
+    picture: ByteArray, scale: float, frame: ImageFrame, bounds: NDArray[Any]
 ) -> tuple[ByteArray, tuple[float, float, float, float]]:
-    """The part of a picture that the figure covers, small enough for a page, and its place.
+    """The part of a picture that lies before `bounds` (2, 3) in FIGURE, small enough for a page, and its place.
 
     scale : pixels of `picture` for each IMAGE pixel
     """
@@ -113,9 +118,8 @@ def _crop(
         image = image.resize((columns, rows), Image.Resampling.BOX)
     x_scale, y_scale = scale * columns / cut.shape[1], scale * rows / cut.shape[0]
     (x, y), units = frame.origin_px, frame.units_per_px
-    place = (
-        x_scale / units, (x - first[0] / scale) * x_scale, -y_scale / units, (y - first[1] / scale) * y_scale,
-    )  # fmt: skip
+    left, top = ((origin - float(start) / scale) for origin, start in zip((x, y), first, strict=True))
+    place = (x_scale / units, left * x_scale, -y_scale / units, top * y_scale)
     return np.asarray(image), place
 
 

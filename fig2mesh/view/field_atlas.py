@@ -34,6 +34,9 @@ OUTSIDE: Final = 24.0
 INSIDE: Final = 4.0
 """Nodes: the bounds of values."""
 
+SPECK: Final = 27
+"""Nodes; smaller islands beside a part's body are slips of its network, which the mesher drops as well."""
+
 MOST_VOXELS: Final = 4_000_000
 """Of all bricks together; figures with more are resampled, so that pages stay below some 12 MB."""
 
@@ -103,18 +106,30 @@ class _Crop:
 
 
 def _cut(part: PartSdf) -> _Crop | None:
-    bounds = negative_bounds(part.grid)
+    grid = _without_specks(part.grid, part.spacing)
+    bounds = negative_bounds(grid)
     if bounds is None:
         return None
     first = np.floor(bounds[0]).astype(int) - MARGIN
     last = np.ceil(bounds[1]).astype(int) + MARGIN
-    n = part.grid.shape[0]
+    n = grid.shape[0]
     inner = tuple(slice(max(a, 0), min(b, n - 1) + 1) for a, b in zip(first, last, strict=True))
     # Beyond the cube values go on straight, as the kernel's gradients assume.
     beyond = [(max(-a, 0), max(b - n + 1, 0)) for a, b in zip(first, last, strict=True)]
-    values = np.pad(part.grid[inner], beyond, mode="reflect", reflect_type="odd")
+    values = np.pad(grid[inner], beyond, mode="reflect", reflect_type="odd")
     corner = part.centre.astype(np.float64) - float(part.edge) / 2
     return _Crop(values, corner + first * part.spacing, part.spacing, np.stack([corner, corner + float(part.edge)]))
+
+
+def _without_specks(grid: FloatArray, spacing: float) -> FloatArray:
+    islands, count = ndimage.label(grid <= 0, np.ones((3, 3, 3)))
+    if count < 2:
+        return grid
+    nodes = np.bincount(islands.ravel())
+    nodes[0] = 0
+    small = nodes < min(SPECK, nodes.max())
+    small[0] = False
+    return np.where(small[islands], np.float32(spacing), grid)
 
 
 def _brick(crop: _Crop, owners: tuple[int, int], shrink: float) -> Brick | None:

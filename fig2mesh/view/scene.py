@@ -50,7 +50,7 @@ def make_scene(
 ) -> Scene:
     """The scene of a figure that is `height_m` high and of which the pipeline has made `body` and `sources`."""
     field, bounds = field_atlas(body), body.bounds()
-    colours = colour_atlas(sources, frame, bounds)
+    colours = colour_atlas(sources, frame, body)
     asset = asset_from_figure(pose, bounds, height_m)
     labels = [int(body.labels[brick.owners[0]]) for brick in field.bricks]
     pen = None

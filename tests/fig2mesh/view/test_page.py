@@ -72,6 +72,17 @@ def test_a_part_cut_off_by_its_cube_ends_there() -> None:
     np.testing.assert_allclose(brick.box, [[-0.3] * 3, [0.3] * 3], atol=1e-6)
 
 
+def test_specks_beside_a_part_are_left_out() -> None:
+    ball = sampled(sphere((0, 0, 0), 0.2), 1, (0, 0, 0), 0.8, 48)
+    grid = ball.grid.copy()
+    grid[2:4, 2:4, 2:4] = -0.01
+    (clean,), (brick,) = (field_atlas(Body((part,))).bricks for part in (ball, replace(ball, grid=grid)))
+    np.testing.assert_array_equal(brick.box, clean.box)
+    speck = sampled(sphere((0, 0, 0), 0.02), 1, (0, 0, 0), 0.8, 48)  # all that there is
+    assert (speck.grid <= 0).sum() < fields.SPECK
+    assert len(field_atlas(Body((speck,))).bricks) == 1
+
+
 def test_too_many_voxels_are_resampled(monkeypatch: pytest.MonkeyPatch) -> None:
     body = Body(mannequin(64))
     full = len(field_atlas(body).values())
@@ -98,23 +109,20 @@ def test_no_surface_is_an_error() -> None:
 
 def test_colours_lie_where_the_slots_say(painted: Painted) -> None:
     sources, frame = painted.sources, painted.frame
-    atlas = colour_atlas(sources, frame, painted.body.bounds())
+    atlas = colour_atlas(sources, frame, painted.body)
     assert len(atlas.slots) == 3  # drawing, head, rest: parts of one layer share a picture
     random = np.random.default_rng(0)
-    low, high = painted.body.bounds()
-    points = random.uniform(low[:2], high[:2], (200, 2))
-    pictures = {0: (sources.seen, 1.0)}
-    pictures |= {atlas.slot_of_label[label]: (plain, sources.plain_scale) for label, plain in sources.plain.items()}
-    for index, slot in enumerate(atlas.slots):
-        (ax, bx, ay, by), (x0, y0, x1, y1) = slot.place, slot.window
-        texels = np.floor(points * (ax, ay) + (bx, by)).astype(int)
-        assert (texels >= (x0, y0)).all()
-        assert (texels < (x1, y1)).all()
-        picture, scale = pictures[index]
-        pixels = np.floor(frame.image_from_figure(points) * scale).astype(int)
-        np.testing.assert_array_equal(
-            atlas.picture[texels[:, 1], texels[:, 0]], np.round(picture[pixels[:, 1], pixels[:, 0]]).astype(np.uint8)
-        )
+    for part, box in zip(painted.body.parts, painted.body.grids.boxes, strict=False):
+        points = random.uniform(box[0, :2], box[1, :2], (50, 2))
+        plain = atlas.slot_of_label[part.part]
+        for index, picture, scale in (0, sources.seen, 1.0), (plain, sources.plain[part.part], sources.plain_scale):
+            (ax, bx, ay, by), (x0, y0, x1, y1) = atlas.slots[index].place, atlas.slots[index].window
+            texels = np.floor(points * (ax, ay) + (bx, by)).astype(int)
+            assert (texels >= (x0, y0)).all()
+            assert (texels < (x1, y1)).all()
+            columns, rows = np.floor(frame.image_from_figure(points) * scale).astype(int).T
+            expected = np.round(picture[rows, columns]).astype(np.uint8)
+            np.testing.assert_array_equal(atlas.picture[texels[:, 1], texels[:, 0]], expected)
 
 
 def test_large_drawings_are_reduced(painted: Painted) -> None:
@@ -123,15 +131,15 @@ def test_large_drawings_are_reduced(painted: Painted) -> None:
     (x, y), units = painted.frame.origin_px, painted.frame.units_per_px
     frame = replace(painted.frame, origin_px=(factor * x, factor * y), units_per_px=units / factor)
     sources = replace(painted.sources, seen=seen, plain_scale=painted.sources.plain_scale / factor)
-    large = colour_atlas(sources, frame, painted.body.bounds())
+    large = colour_atlas(sources, frame, painted.body)
     assert max(large.picture.shape[:2]) < 1700
     ax, bx, ay, by = large.slots[0].place
-    u, v, w, z = colour_atlas(painted.sources, painted.frame, painted.body.bounds()).slots[0].place
+    u, v, w, z = colour_atlas(painted.sources, painted.frame, painted.body).slots[0].place
     assert -ay == pytest.approx(ax, rel=2e-3)
     # Where the small drawing's texel (20, 20) ends up; its colour is the same.
     point = np.array([(20.5 - v) / u, (20.5 - z) / w])
     texel = np.floor(point * (ax, ay) + (bx, by)).astype(int)
-    expected = colour_atlas(painted.sources, painted.frame, painted.body.bounds()).picture[20, 20]
+    expected = colour_atlas(painted.sources, painted.frame, painted.body).picture[20, 20]
     np.testing.assert_allclose(large.picture[texel[1], texel[0]], expected, atol=2)
 
 
