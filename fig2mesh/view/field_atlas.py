@@ -114,9 +114,13 @@ def _cut(part: PartSdf) -> _Crop | None:
     last = np.ceil(bounds[1]).astype(int) + MARGIN
     n = grid.shape[0]
     inner = tuple(slice(max(a, 0), min(b, n - 1) + 1) for a, b in zip(first, last, strict=True))
-    # Beyond the cube values go on straight, as the kernel's gradients assume.
     beyond = [(max(-a, 0), max(b - n + 1, 0)) for a, b in zip(first, last, strict=True)]
-    values = np.pad(grid[inner], beyond, mode="reflect", reflect_type="odd")
+    values = np.pad(grid[inner], beyond, mode="edge")
+    # As `Body` has it outside of a cube; a part that is still negative at its faces ends there.
+    nodes = [np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
+    away = [line - line.clip(0, n - 1) for line in nodes]
+    squared = sum(np.square(offset) for offset in np.ix_(*away)) * part.spacing**2
+    values = np.where(squared > 0, np.sqrt(squared + np.maximum(values, 0) ** 2), values).astype(np.float32)
     corner = part.centre.astype(np.float64) - float(part.edge) / 2
     return _Crop(values, corner + first * part.spacing, part.spacing, np.stack([corner, corner + float(part.edge)]))
 

@@ -38,30 +38,30 @@ vec3 gradient(int g, vec3 p, float reach) {
     value(g, at + e.yyx) - value(g, at - e.yyx)) / (2.0 * reach * grid[g * 6].w);
 }
 
-// Where a ray is in a grid's box, widened by `room`; from > to where it misses.
-void box(int g, vec3 o, vec3 inverse, float room, out float from, out float to) {
+// From where to where a ray is in a grid's box, widened by `room`; backwards where it misses.
+vec2 box(int g, vec3 o, vec3 inverse, float room) {
   vec3 a = (grid[g * 6].xyz - room - o) * inverse, b = (grid[g * 6 + 1].xyz + room - o) * inverse;
   vec3 low = min(a, b), high = max(a, b);
-  from = max(max(low.x, low.y), max(low.z, 0.0));
-  to = min(high.x, min(high.y, high.z));
+  return vec2(max(max(low.x, low.y), max(low.z, 0.0)), min(high.x, min(high.y, high.z)));
 }
 
 // First t in [t, end] where grid g is not positive; the bracket is halved until it is a thousandth of a node.
-// near: least value on the way, and where.
-float march(int g, vec3 o, vec3 d, float t, float end, inout vec3 near) {
+// solid: where the ray is in the box that holds the solid, beyond which the values of a part that is cut off go on.
+// near: least value on the way, where, and of which grid.
+float march(int g, vec3 o, vec3 d, float t, float end, vec2 solid, inout vec3 near) {
   vec3 at = nodes(g, o), w = d / grid[g * 6].w;
   float rate = grid[g * 6 + 1].w, least = LEAST * grid[g * 6].w, before = t;
   for (int i = 0; i < STEPS; i++) {
     float v = value(g, at + w * t);
-    if (v <= 0.0) {
+    if (v <= 0.0 && t >= solid.x && before <= solid.y) {
       for (int k = 0; k < 8; k++) {
         float middle = 0.5 * (before + t);
         if (value(g, at + w * middle) > 0.0) before = middle; else t = middle;
       }
-      return before;
+      return max(before, solid.x);
     }
 #ifdef OUTLINE
-    if (v < near.x) near = vec3(v, t, float(g));
+    if (v > 0.0 && v < near.x) near = vec3(v, t, float(g));
 #endif
     before = t;
     if (t >= end) break;
@@ -158,18 +158,16 @@ vec4 shade(vec3 o, vec3 d) {
   float best = NEVER;
   int hit = -1;
   vec3 near = vec3(NEVER, 0.0, -1.0);
-#ifdef OUTLINE
-  float room = line.w;
-#else
-  float room = 0.0;
-#endif
   for (int i = 0; i < TRACED; i++) {
     int g = order[i];
-    float from, to;
-    box(g, o, inverse, room, from, to);
-    to = min(to, best);
-    if (from > to) continue;
-    float t = march(g, o, d, from, to, near);
+    vec2 solid = box(g, o, inverse, 0.0), reach = solid;
+#ifdef OUTLINE
+    reach = box(g, o, inverse, line.w);
+    if (solid.x > solid.y) solid = vec2(NEVER);
+#endif
+    reach.y = min(reach.y, best);
+    if (reach.x > reach.y) continue;
+    float t = march(g, o, d, reach.x, reach.y, solid, near);
     if (t < best) { best = t; hit = g; }
   }
   vec4 colour = vec4(0);
