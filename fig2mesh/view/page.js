@@ -25,7 +25,7 @@ async function start() {
   const canvas = find('canvas');
   const view = new FigureView(canvas, figure, await decodeFigure(figure), find('shader').textContent);
   const { camera } = view;
-  const still = { pending: false, moving: false, scale: 1, timer: 0, last: 0 };
+  const still = { pending: false, moving: false, scale: 1, timer: 0 };
 
   // Whether the canvas has changed its number of pixels.
   function resize() {
@@ -39,27 +39,33 @@ async function start() {
     resize();
     try { view.draw(); } catch (error) { fail(error); }
   }
-  // Devices without a graphics processor get few pixels from the start.
+  // Devices without a graphics processor get few pixels from the start. Two sizes, so that what a picture costs anyway
+  // does not count.
   function calibrate() {
-    const [width, height] = [48, 48];
-    Object.assign(canvas, { width, height });
-    view.milliseconds();
-    const each = view.milliseconds() / (width * height);
+    const [small, large] = [48, 144];
+    const taken = [small, small, large].map((edge) => {
+      Object.assign(canvas, { width: edge, height: edge });
+      return view.milliseconds();
+    });
+    const each = Math.max(taken[2] - taken[1], 0) / (large ** 2 - small ** 2);
     const all = canvas.clientWidth * canvas.clientHeight * window.devicePixelRatio ** 2;
     still.scale = clamp(Math.sqrt(START / Math.max(each * all, 1)), 0.25, 1);
   }
   function request() {
     if (still.pending) return;
     still.pending = true;
-    requestAnimationFrame(() => { still.pending = false; draw(); });
+    requestAnimationFrame((begun) => {
+      still.pending = false;
+      draw();
+      if (still.moving) requestAnimationFrame((now) => pace(now - begun));
+    });
   }
   // Devices that cannot keep up with a moving figure draw fewer pixels of it, and at rest twice as many an edge.
+  function pace(took) {
+    if (took > SLOW) still.scale = Math.max(0.8 * still.scale, 0.25);
+    if (took < SLOW / 3) still.scale = Math.min(1.1 * still.scale, 1);
+  }
   function moved() {
-    const now = performance.now();
-    const took = still.moving ? now - still.last : 0;
-    if (took > SLOW && took < 1000) still.scale = clamp(0.8 * still.scale, 0.25, 1);
-    if (took && took < SLOW / 3) still.scale = clamp(1.1 * still.scale, 0.25, 1);
-    still.last = now;
     still.moving = true;
     clearTimeout(still.timer);
     still.timer = setTimeout(() => { still.moving = false; request(); }, 150);
