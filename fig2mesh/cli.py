@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__, render_cli
+from fig2mesh import __version__, render_cli, view_cli
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
 from fig2mesh.training import cli as training_cli
@@ -197,6 +197,7 @@ def doctor() -> None:
 
 
 render_cli.add_to(cli)
+view_cli.add_to(cli)
 data_cli.add_to(cli)
 training_cli.add_to(cli)
 cli.add_command(tradeoff)

@@ -70,7 +70,7 @@ def run(
 ) -> None:
     """What `fig2mesh FIGURE …` does; the parameters are the options of the command line."""
     configure_logging(quiet, verbose)
-    placement = _placement(lonlat, facing, height_m, altitude, altitude_datum)
+    placement = placement_for(lonlat, facing, height_m, altitude, altitude_datum)
     targets = outputs or (figure.stem + ".glb",)
     # Everything that can be refused is refused before the work begins.
     if resume_from is not None and resume_from not in STAGES:
@@ -101,7 +101,7 @@ def run(
     timings: list[Timing] = []
     written: list[Path] = []
     planned = plan(settings, targets)
-    with _progress(quiet) as advance, counting() as counts:
+    with progress(quiet) as advance, counting() as counts:
         _run_steps(settings, height_m, results, timings, stages, resume_from, advance, planned)
         found = results["solid"].how
         if found.components != pieces:
@@ -194,9 +194,10 @@ def _stages(folder: Path, figure: Figure, settings: Settings, resume_from: str |
     return folder
 
 
-def _placement(
+def placement_for(
     lonlat: tuple[float, float] | None, facing: str, height_m: float, altitude: float, datum: str
 ) -> GeoPlacement | None:
+    """The place that the options name; None without --lonlat."""
     heading = parse_facing(facing)
     if not 0.001 <= height_m <= 1e6:
         raise InputError("--height-m", f"{height_m:g} m", "give a height between 1 mm and 1000 km")
@@ -305,7 +306,7 @@ def configure_logging(quiet: bool, verbose: int) -> None:
 
 
 @contextmanager
-def _progress(quiet: bool) -> Iterator[Any]:
+def progress(quiet: bool) -> Iterator[Any]:
     """A function that names the stage under way; a bar only on a terminal."""
     if quiet or not sys.stderr.isatty():
         yield lambda name: None

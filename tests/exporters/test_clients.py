@@ -9,7 +9,7 @@ import pytest
 from exporters.tiles import write_tileset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import ZURICH, asset, capsule
-from tests.exporters.conftest import RunScript
+from tests.node import RunScript
 
 PLACES = {
     "Zurich": (8.5417, 47.3769, 455.34),

@@ -20,7 +20,7 @@ from exporters.glb import glb_bytes, write_glb, write_gltf
 from exporters.gltf_reader import read_gltf
 from exporters.validate import validate
 from tests.exporters.analytic import ZURICH, asset, capsule
-from tests.exporters.conftest import RunScript
+from tests.node import RunScript
 
 COLORS = np.tile(np.array([[255, 128, 0]], np.uint8), (len(capsule().vertices), 1))
 

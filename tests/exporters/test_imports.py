@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import exporters
-from tests.exporters.conftest import ROOT
+from tests.node import ROOT
 
 HEAVY = ("torch", "open3d", "pxr", "trimesh", "pygltflib", "scipy", "pyproj", "PIL", "fig2mesh")
 

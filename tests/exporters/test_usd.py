@@ -22,7 +22,7 @@ from georef.geodesy import nose_bearing_deg
 from georef.placement import GeoPlacement
 from georef.transform import Transform
 from tests.exporters.analytic import ZURICH, asset, capsule
-from tests.exporters.conftest import ROOT
+from tests.node import ROOT
 
 SUFFIXES = [".usda", ".usdc", ".usdz"]
 

@@ -1,0 +1,38 @@
+"""The page of a scene on a globe: the same shader, its picture a billboard in CesiumJS (paper §4.5)."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Collection
+
+from fig2mesh.view.page import asset, figure_json, filled
+from fig2mesh.view.scene import Scene
+from georef.placement import GeoPlacement
+
+
+def globe_page(scene: Scene, placement: GeoPlacement, cesium: str, effects: Collection[str] | None = None) -> str:
+    """The page of a figure that stands on the globe.
+
+    cesium : address of CesiumJS as built for pages, with a slash at its end; absolute or relative to the page
+    effects : that are on; None: `fig2mesh.view.page.default_effects`
+    """
+    place = {
+        "lon_deg": placement.lon_deg,
+        "lat_deg": placement.lat_deg,
+        "height_m": placement.height_m,
+        "heading_deg": placement.heading_deg,
+        "cesium": cesium,
+    }
+    return filled(
+        "globe.html",
+        {
+            "title": html.escape(scene.name),
+            "cesium": html.escape(cesium),
+            "place": json.dumps(place).replace("</", "<\\/"),
+            "shader": asset("shader.glsl"),
+            "figure": figure_json(scene, effects),
+            "view": asset("view.js"),
+            "globe": asset("globe.js"),
+        },
+    )

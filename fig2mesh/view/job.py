@@ -1,0 +1,154 @@
+"""`fig2mesh view`: read a drawing, make its page, show or write it. All side effects are here."""
+
+from __future__ import annotations
+
+import logging
+import os
+import webbrowser
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fig2mesh.errors import InputError, OutputError
+from fig2mesh.job import configure_logging, placement_for, progress, torch_device
+from fig2mesh.parse.read import read_figure
+from fig2mesh.records import Figure
+from fig2mesh.settings import Settings, settings_for
+from fig2mesh.view.globe import globe_page
+from fig2mesh.view.page import EFFECTS, view_page
+from fig2mesh.view.scene import Scene, make_scene
+from fig2mesh.view.server import address_of, page_server
+
+log = logging.getLogger("fig2mesh")
+
+NEEDED = ("lift", "parts", "body", "textures")
+"""Stages of the pipeline that a page is made of: no mesh."""
+
+CESIUM = "cesium"
+"""Where a page finds CesiumJS, relative to its own address."""
+
+
+def run(
+    *,
+    figure: Path,
+    output: Path | None,
+    effects: str | None,
+    lonlat: tuple[float, float] | None,
+    facing: str,
+    height_m: float,
+    altitude: float,
+    altitude_datum: str,
+    cesium: Path | None,
+    mask: Path | None,
+    keypoints: Path | None,
+    part_labels: Path | None,
+    bbox: tuple[int, int, int, int] | None,
+    quality: Any,
+    parts: str,
+    textures: str | None,
+    contours: str,
+    device: str,
+    seed: int,
+    port: int,
+    open_: bool,
+    overwrite: bool,
+    quiet: bool,
+    verbose: int,
+) -> None:
+    """What `fig2mesh view FIGURE …` does; the parameters are the options of the command line."""
+    configure_logging(quiet, verbose)
+    placement = placement_for(lonlat, facing, height_m, altitude, altitude_datum)
+    wanted = None if effects is None else _effects(effects)
+    if output is not None:
+        _check_output(output, overwrite)
+    if cesium is not None and (placement is None or output is not None):
+        raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
+    folders = {CESIUM: find_cesium(cesium)} if placement is not None and output is None else {}
+    drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
+    settings = settings_for(
+        quality, parts=parts, textures=textures, contours=contours, device=torch_device(device), seed=seed
+    )
+    server = page_server("", port) if output is None else None  # a port that is taken is told before the work
+    if server is not None:
+        server.server_close()
+    with progress(quiet) as advance:
+        scene = scene_of(drawn, settings, height_m, advance)
+        advance("page")
+        page = view_page(scene, wanted) if placement is None else globe_page(scene, placement, f"{CESIUM}/", wanted)
+    if output is not None:
+        _write(output, page)
+        log.info("%s: %.1f MB", output, len(page) / 1e6)
+        return
+    with page_server(page, port, folders) as shown:
+        address = address_of(shown)
+        click.echo(address)
+        log.info("Ctrl-C ends it")
+        if open_:
+            webbrowser.open(address)
+        try:
+            shown.serve_forever()
+        except KeyboardInterrupt:
+            log.info("ended")
+
+
+def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any = lambda name: None) -> Scene:
+    """The scene of a figure, by those stages of the pipeline that it needs.
+
+    advance : told the name of each stage
+    """
+    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.parts.pieces import clean
+    from fig2mesh.pipeline import steps
+
+    figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+    results: dict[str, Any] = {"figure": figure, "pieces": pieces}
+    for step in steps(settings, height_m):
+        if step.name in NEEDED:
+            advance(step.name)
+            results[step.name] = step.run(*(results[name] for name in step.needs))
+    lift, body, sources = results["lift"], results["body"], results["textures"]
+    contours = settings.contours == "keep"
+    return make_scene(figure.name, body, sources, image_frame(figure), lift, height_m, contours)
+
+
+def find_cesium(folder: Path | None) -> Path:
+    """The folder of CesiumJS as built for pages, in the npm package that was named, or that npm put beside us."""
+    here = Path.cwd()
+    tried = [folder] if folder is not None else [up / "node_modules" / "cesium" for up in (here, *here.parents)]
+    for package in tried:
+        for built in (package / "Build" / "Cesium", package):
+            if (built / "Cesium.js").is_file():
+                return built
+    found = f"no CesiumJS in {folder}" if folder is not None else "no CesiumJS in node_modules"
+    raise InputError("--lonlat" if folder is None else "--cesium", found, "npm install cesium, or pass --cesium DIR")
+
+
+def _effects(text: str) -> tuple[str, ...]:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in EFFECTS:
+            raise InputError("--effects", f"{name!r} is no effect", f"choose from {', '.join(EFFECTS)}")
+    return tuple(names)
+
+
+def _check_output(path: Path, overwrite: bool) -> None:
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise OutputError(path, "is no name for a page", "give -o a name that ends in .html")
+    if path.is_dir():
+        raise OutputError(path, "is a folder", "give -o a file name")
+    if path.exists() and not overwrite:
+        raise OutputError(path, "exists", "pass --overwrite or another name")
+    if not path.parent.is_dir():
+        raise OutputError(path, f"no folder {path.parent}", "create it first")
+
+
+def _write(path: Path, text: str) -> None:
+    """Whole or not at all."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        os.replace(partial, path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise OutputError(path, error.strerror or "cannot be written", "choose another name") from None

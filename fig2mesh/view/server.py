@@ -1,0 +1,64 @@
+"""A server for one page, for this machine alone."""
+
+from __future__ import annotations
+
+import posixpath
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from fig2mesh.errors import InputError
+
+TYPES = {
+    ".css": "text/css", ".gif": "image/gif", ".html": "text/html", ".jpg": "image/jpeg", ".js": "text/javascript",
+    ".json": "application/json", ".png": "image/png", ".svg": "image/svg+xml", ".wasm": "application/wasm",
+    ".xml": "application/xml",
+}  # fmt: skip
+"""Media types by suffix; not the system's, which on some Windows machines calls scripts plain text."""
+
+
+def page_server(page: str, port: int = 0, folders: dict[str, Path] | None = None) -> ThreadingHTTPServer:
+    """A server bound to the loopback address that answers / with the page; `serve_forever()` starts it.
+
+    port : 0 takes a free one
+    folders : first part of an address → folder whose files lie below it
+    """
+    body = page.encode("utf-8")
+    shared = {name: folder.resolve() for name, folder in (folders or {}).items()}
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            address = unquote(urlsplit(self.path).path)
+            if address in ("/", "/index.html"):
+                self._answer(body, "text/html; charset=utf-8")
+                return
+            name, _, rest = posixpath.normpath(address).lstrip("/").partition("/")
+            path = (shared[name] / rest).resolve() if name in shared and "\0" not in rest else None
+            # Links and dots lead nowhere outside of the folder.
+            if path is None or not path.is_relative_to(shared[name]) or not path.is_file():
+                self.send_error(HTTPStatus.NOT_FOUND)
+                return
+            self._answer(path.read_bytes(), TYPES.get(path.suffix.lower(), "application/octet-stream"))
+
+        def _answer(self, content: bytes, kind: str) -> None:
+            self.send_response(HTTPStatus.OK)
+            self.send_header("Content-Type", kind)
+            self.send_header("Content-Length", str(len(content)))
+            self.send_header("Cache-Control", "no-store" if content is body else "max-age=3600")
+            self.end_headers()
+            self.wfile.write(content)
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Nothing: the terminal shows the address and no more."""
+
+    try:
+        return ThreadingHTTPServer(("127.0.0.1", port), Handler)
+    except OSError as error:
+        remedy = "choose another one, or leave it out"
+        raise InputError("--port", f"{port} cannot be used ({error.strerror})", remedy) from None
+
+
+def address_of(server: ThreadingHTTPServer) -> str:
+    """What to open in a browser."""
+    return f"http://127.0.0.1:{server.server_address[1]}/"

@@ -1,0 +1,63 @@
+"""`fig2mesh view`: a figure in the browser; nothing heavy is imported before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+FILE = click.Path(path_type=Path)
+
+
+@click.command()
+@click.argument("figure", type=FILE)
+@click.option(
+    "-o", "--output", type=FILE, metavar="PAGE.html", help="Write the page there instead of showing it.",
+)  # fmt: skip
+@click.option(
+    "--effects", metavar="NAME,NAME…",
+    help="What is on at first: texture, blend, creases, light, ao, outline, smooth-union, perspective, antialias. "
+    "Default: all but perspective, and outline only where the drawing's own is not there.",
+)  # fmt: skip
+@click.option("--lonlat", type=float, nargs=2, metavar="LON LAT", help="Show it there on a globe; needs CesiumJS.")
+@click.option(
+    "--facing", default="viewer", metavar="N|NE|…|DEG|viewer", show_default=True,
+    help="Compass bearing of the nose; viewer: south.",
+)  # fmt: skip
+@click.option("--height-m", type=float, metavar="M", default=1.79, show_default=True, help="Height of the figure.")
+@click.option("--altitude", type=float, metavar="M", default=0.0, show_default=True, help="Height of the feet.")
+@click.option(
+    "--altitude-datum", default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", show_default=True,
+    help="What --altitude is measured from.",
+)  # fmt: skip
+@click.option(
+    "--cesium", type=FILE, metavar="DIR",
+    help="The npm package cesium; default: node_modules/cesium in this folder or one above. A page written with -o "
+    "loads CesiumJS from the folder cesium beside it.",
+)  # fmt: skip
+@click.option("--mask", type=FILE, metavar="PNG", help="Silhouette, bright on dark; default: the alpha channel.")
+@click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints.")
+@click.option("--part-labels", type=FILE, metavar="PNG", help="Part label of every pixel.")
+@click.option("--bbox", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Part of the picture that holds the figure.")
+@click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
+@click.option("--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True)
+@click.option("--textures", type=click.Choice(["network", "plain"]), help="As in the main job.")
+@click.option("--contours", type=click.Choice(["keep", "drop"]), default="keep", show_default=True)
+@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
+@click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free one", metavar="N")
+@click.option("--open/--no-open", "open_", default=True, help="Open the page in a browser.  [default: open]")
+@click.option("--overwrite", is_flag=True, help="Replace an existing page.")
+@click.option("-q", "--quiet", is_flag=True, help="Only errors.")
+@click.option("-v", "--verbose", count=True, help="More messages; twice: tracebacks.")
+def view(**options: Any) -> None:
+    """Look at FIGURE from all sides in a browser, which sphere-traces its part fields; Ctrl-C ends it."""
+    from fig2mesh.view.job import run
+
+    run(**options)
+
+
+def add_to(cli: click.Group) -> None:
+    """Make `view` a command of `cli`."""
+    cli.add_command(view)

@@ -1,0 +1,53 @@
+"""Programs of others that run in Node: installed on first use into build/, their absence said aloud."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+CLIENTS = ROOT / "tests" / "clients"
+
+RunScript = Callable[..., Any]
+
+
+def installed(folder: Path, *names: str) -> Path:
+    """The node_modules folder with these packages, in the versions of tests/clients/package.json."""
+    if shutil.which("node") is None or shutil.which("npm") is None:
+        pytest.skip(f"node and npm are not both there: not checked with {', '.join(names)}")
+    pinned = json.loads((CLIENTS / "package.json").read_text())
+    versions = pinned["dependencies"] | pinned["optionalDependencies"]
+    wanted = {name: versions[name] for name in names}
+    manifest = folder / "package.json"
+    modules = folder / "node_modules"
+    present = manifest.is_file() and json.loads(manifest.read_text()).get("dependencies") == wanted
+    if not present or not all((modules / name).is_dir() for name in names):
+        folder.mkdir(parents=True, exist_ok=True)
+        manifest.write_text(json.dumps({"private": True, "dependencies": wanted}))
+        command = ["npm", "install", "--prefix", str(folder), "--no-audit", "--no-fund", "--no-package-lock"]
+        install = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=600)
+        if install.returncode:
+            manifest.unlink()  # so that the next run tries again
+            pytest.skip(f"npm cannot install {', '.join(names)}: {install.stderr.strip()[-200:]}")
+    return modules
+
+
+def runner(modules: Path) -> RunScript:
+    """A function that runs a script of tests/clients with JSON for its stdin and returns its stdout as JSON."""
+
+    def run(script: str, *arguments: str | Path, stdin: Any = None) -> Any:
+        done = subprocess.run(
+            ["node", str(CLIENTS / script), *map(str, arguments)],
+            input=json.dumps(stdin), capture_output=True, text=True, check=True, timeout=300,
+            env=os.environ | {"NODE_PATH": str(modules)},
+        )  # fmt: skip
+        return json.loads(done.stdout)
+
+    return run
