@@ -41,7 +41,7 @@ def tolerances(body: Body) -> tuple[Tolerance, ...]:
         seconds = time.perf_counter() - start
         pairs = [np.isfinite(hit.depth) & np.isfinite(depth) for hit, depth in zip(hits, exact, strict=True)]
         errors = np.concatenate(
-            [np.abs(hit.depth - depth)[both] for hit, depth, both in zip(hits, exact, pairs, strict=True)]
+            [np.abs(hit.depth[both] - depth[both]) for hit, depth, both in zip(hits, exact, pairs, strict=True)]
         )
         steps = float(np.mean([hit.steps.mean() for hit in hits]))
         mean_mm, worst_mm = 1000 * float(errors.mean()), 1000 * float(errors.max())
