@@ -17,7 +17,7 @@ from fig2mesh.field.empty_space import EmptySpace
 from fig2mesh.field.grid_kernels import owner_at
 from fig2mesh.field.grids import Grids
 from fig2mesh.field.march_kernel import FAR, march, reciprocal, unit_normal
-from fig2mesh.render.surface_colours import BAND, HIDDEN, Colouring
+from fig2mesh.render.surface_colours import BAND, HIDDEN, STEEPEST, Colouring
 
 TILE = 8
 """Pixels along the edge of a tile."""
@@ -139,15 +139,13 @@ def bilinear(picture: NDArray[np.uint8], x: float, y: float) -> tuple[float, flo
 
 
 @helper
-def openness(front: NDArray[np.float32], x: float, y: float, z: float) -> float:
-    """Share, 0 to 1, of the map's four pixels about (x, y) in front of which a point at z lies, or so little behind
-    them that it belongs to the same surface."""
+def openness(front: NDArray[np.float32], x: float, y: float, limit: float) -> float:
+    """Share, 0 to 1, of the map's four pixels about (x, y) in which the body reaches no further forward than `limit`."""
     x = min(max(x, 0.0), front.shape[1] - 1.0)
     y = min(max(y, 0.0), front.shape[0] - 1.0)
     i, j = int(x), int(y)
     ii, jj = min(i + 1, front.shape[1] - 1), min(j + 1, front.shape[0] - 1)
     u, v = x - i, y - j
-    limit = z + HIDDEN
     share = 0.0
     if front[j, i] <= limit:
         share += (1.0 - u) * (1.0 - v)
@@ -170,11 +168,13 @@ def surface_colour(
     """
     maps = colouring.maps
     samples = 0
-    weight = min(max((nz - colouring.middle) / BAND + 0.5, 0.0), 1.0)
+    weight = min(max((nz - colouring.least) / BAND, 0.0), 1.0)
     weight *= weight * (3.0 - 2.0 * weight)
     if weight > 0.0:
         x, y = maps[2, 0] * px + maps[2, 1], maps[2, 2] * py + maps[2, 3]
-        weight *= openness(colouring.front, x, y, pz)
+        # from one pixel of the map to the next the surface itself falls by its slope
+        slope = 1.0 / max(nz, STEEPEST)
+        weight *= openness(colouring.front, x, y, pz + HIDDEN + 1.5 * slope / maps[2, 0])
         samples += 1
     red, green, blue = 0.0, 0.0, 0.0
     if weight > 0.0:

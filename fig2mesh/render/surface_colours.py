@@ -21,15 +21,17 @@ from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray
 from fig2mesh.texture.sources import Sources
 
-BAND = 0.2
-"""The normal's z over which the drawing goes over into the plain colours, centred on `Sources.grazing`."""
+BAND = 0.1
+"""The normal's z over which the drawing goes over into the plain colours, upwards from `Sources.grazing`."""
 
 DEPTH_ROWS = 1024
 """Rows of the map of how far forward the body reaches: finer than the drawing's line, 4 MB."""
 
-HIDDEN = 0.006
-"""Points this far behind what the drawing saw are hidden, FIGURE units: less than a finger is thick, and more than the
-surface falls from one pixel of the map to the next where its normal's z is above 0.3."""
+HIDDEN = 0.005
+"""Points this far behind what the drawing saw are hidden, FIGURE units: less than a finger is thick."""
+
+STEEPEST = 0.05
+"""The normal's z below which a surface counts as no steeper when it is asked what hides it."""
 
 LEVELS = 5
 """Halvings of the pictures kept for small frames."""
@@ -44,7 +46,7 @@ class Colouring(NamedTuple):
     front : (h, w) float32, greatest z of the body, FIGURE; -infinity beside it
     maps : (3, 4) float64, for seen, plain and front: column = [0] x + [1], row = [2] y + [3], pixel centres at whole
         numbers
-    middle : z of the normal in the middle of the soft border
+    least : z of the normal from which on the drawing has a share
     """
 
     seen: NDArray[np.uint8]
@@ -52,7 +54,7 @@ class Colouring(NamedTuple):
     slots: NDArray[np.int64]
     front: NDArray[np.float32]
     maps: NDArray[np.float64]
-    middle: float
+    least: float
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,7 @@ class SurfaceColours:
     """Colours of a body's surface; make it with `surface_colours`, once for a figure.
 
     seen, plain : pictures of halved size after halved size, `Colouring`
-    slots, front, middle : as in `Colouring`
-    scale : pixels of `seen[0]` and of `plain[0]` a FIGURE unit
+    slots, front, least : as in `Colouring`
     maps : of the largest pictures
     """
 
@@ -70,7 +71,7 @@ class SurfaceColours:
     slots: NDArray[np.int64]
     front: FloatArray
     maps: NDArray[np.float64]
-    middle: float
+    least: float
 
     def at(self, pitch: float) -> Colouring:
         """For frames with pixels of `pitch` FIGURE units: pictures no finer than that, which would sparkle."""
@@ -83,7 +84,7 @@ class SurfaceColours:
             maps[row] = maps[row] / 2**level
             maps[row, 1::2] += 0.5 / 2**level - 0.5
             chosen.append(levels[level])
-        return Colouring(chosen[0], chosen[1], self.slots, self.front, sealed(maps, np.float64), self.middle)
+        return Colouring(chosen[0], chosen[1], self.slots, self.front, sealed(maps, np.float64), self.least)
 
     @cached_property
     def megabytes(self) -> float:

@@ -1,0 +1,238 @@
+"""Measure frames a second on a turntable: `python -m tests.benchmarks.frames [OUT.md]`.
+
+Writes a Markdown table, by default docs/frames.md. Embree (Open3D's RaycastingScene) casts the same rays at the
+isosurface mesh of the same field, frame by frame in turn with ours. Machines differ and are noisy: compare ratios
+within one run.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+FIGURES = Path(__file__).parents[2] / "examples" / "figures"
+SIZES = (256, 512, 1024)
+YAWS = tuple(range(0, 360, 10))
+MARGIN = 0.01
+"""Free border, share of the picture: the figure's height fills the frame."""
+CLOSE = 0.45
+"""Height of the close-up relative to that."""
+SPACING = 0.01
+"""Of the isosurface, FIGURE units: what the run benchmark uses."""
+WANTS = {"depth": {"depth"}, "normals": {"depth", "normals"}, "colour": {"colour"}, "all": {"colour", "depth", "normals", "parts"}}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """body, colours : what frames are made of; note : where it comes from."""
+
+    name: str
+    body: Any
+    colours: Any
+
+
+def subjects() -> list[Subject]:
+    """The analytic mannequin and two drawn examples at standard quality."""
+    from fig2mesh.field.analytic import mannequin
+    from fig2mesh.field.body import Body
+    from fig2mesh.parse.frame import ImageFrame, image_frame
+    from fig2mesh.parse.read import read_figure
+    from fig2mesh.pipeline import steps
+    from fig2mesh.render.surface_colours import surface_colours
+    from fig2mesh.settings import PRESETS
+    from fig2mesh.texture.sources import Sources
+
+    body = Body(mannequin(64))
+    rows, columns = np.mgrid[0:1000, 0:1000].astype(np.float32)
+    checks = np.stack([rows % 255, columns % 255, 128 + 0 * rows], axis=-1)
+    plain = {part: np.full((500, 500, 3), 16.0 * part, np.float32) for part in range(1, 15)}
+    sources = Sources(checks, plain, 0.5)
+    found = [Subject("mannequin", body, surface_colours(body, sources, ImageFrame((500.0, 500.0), 0.002)))]
+    for name in ("farmer", "market_woman"):
+        folder = FIGURES / name
+        results: dict[str, Any] = {
+            "figure": read_figure(folder / "image.png", keypoints=folder / "keypoints.json")
+        }
+        for step in steps(PRESETS["standard"], 1.79):
+            if step.name in ("lift", "parts", "body", "textures"):
+                results[step.name] = step.run(*(results[need] for need in step.needs))
+        body = results["body"]
+        colours = surface_colours(body, results["textures"], image_frame(results["figure"]))
+        found.append(Subject(name.replace("_", " "), body, colours))
+    return found
+
+
+def measure(subject: Subject, size: int, close: bool) -> dict[str, float]:
+    """Median seconds of a frame for each of `WANTS` and Embree, and counts, over the turntable."""
+    import open3d as o3d
+
+    from fig2mesh.field.camera import framing
+    from fig2mesh.render.frame import FrameCamera, render_frame
+
+    scene = _scene(subject)
+    times: dict[str, list[float]] = {name: [] for name in (*WANTS, "embree")}
+    counts, shares = [], []
+    for yaw in YAWS:
+        centre, height = framing(subject.body.bounds(), (size, size), yaw, margin=MARGIN)
+        camera = FrameCamera(yaw, size=(size, size), height=height * (CLOSE if close else 1.0), centre=centre)
+        rays = camera.rays()
+        packed = o3d.core.Tensor.from_numpy(np.concatenate([rays.origins, rays.directions], axis=1))
+        frame = None
+        for name, want in WANTS.items():
+            take = lambda want=want: render_frame(subject.body, camera, colours=subject.colours, want=want)  # noqa: E731
+            seconds, frame = _timed(take)
+            times[name].append(seconds)
+        times["embree"].append(_timed(lambda packed=packed: scene.cast_rays(packed))[0])
+        counts.append((frame.counts.cells / max(frame.counts.rays, 1), frame.counts.rays / size**2))
+        shares.append(np.isfinite(frame.depth).mean())
+    result = {name: statistics.median(some) for name, some in times.items()}
+    result["ratio"] = statistics.median(a / b for a, b in zip(times["colour"], times["embree"], strict=True))
+    result["ratio_normals"] = statistics.median(a / b for a, b in zip(times["normals"], times["embree"], strict=True))
+    result["cells"] = statistics.mean(cells for cells, _ in counts)
+    result["filled"] = float(np.mean(shares))
+    return result
+
+
+_scenes: dict[str, Any] = {}
+
+
+def _scene(subject: Subject) -> Any:
+    import open3d as o3d
+
+    from fig2mesh.mesh.isosurface import isosurface
+
+    if subject.name not in _scenes:
+        mesh = isosurface(subject.body, spacing=SPACING)
+        scene = o3d.t.geometry.RaycastingScene()
+        vertices = o3d.core.Tensor.from_numpy(np.array(mesh.vertices))
+        scene.add_triangles(vertices, o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)))
+        _scenes[subject.name] = (scene, len(mesh.faces))
+    return _scenes[subject.name][0]
+
+
+def _timed(job: Callable[[], Any]) -> tuple[float, Any]:
+    """The better of two runs after a first that warms the caches: what a turntable in motion meets."""
+    job()
+    best, result = float("inf"), None
+    for _ in range(2):
+        start = time.perf_counter()
+        result = job()
+        best = min(best, time.perf_counter() - start)
+    return best, result
+
+
+def first_use() -> tuple[float, float]:
+    """Seconds until the first coloured frame in a fresh process: kernels compiled, and kernels from disk."""
+    import tempfile
+
+    script = (
+        "import time; from tests.benchmarks.frames import quick; "
+        "body, colours = quick(); start = time.perf_counter(); "
+        "from fig2mesh.render.frame import FrameCamera, render_frame; "
+        "render_frame(body, FrameCamera(0, size=(64, 64)), colours=colours()); print(time.perf_counter() - start)"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        cold, warm = (
+            float(subprocess.run([sys.executable, "-c", script], env=environment, check=True, capture_output=True).stdout)
+            for _ in range(2)
+        )
+    return cold, warm
+
+
+def quick() -> tuple[Any, Callable[[], Any]]:
+    """A body, and how its colours are made."""
+    from fig2mesh.field.analytic import mannequin
+    from fig2mesh.field.body import Body
+    from fig2mesh.parse.frame import ImageFrame
+    from fig2mesh.render.surface_colours import surface_colours
+    from fig2mesh.texture.sources import Sources
+
+    body = Body(mannequin(32))
+    sources = Sources(np.zeros((50, 50, 3), np.float32), {1: np.zeros((50, 50, 3), np.float32)}, 1.0)
+    return body, lambda: surface_colours(body, sources, ImageFrame((25.0, 25.0), 0.04))
+
+
+def preparation(subject: Subject) -> dict[str, float]:
+    """Seconds and megabytes of what is made once for a body."""
+    from fig2mesh.field.body import Body
+
+    body = Body(subject.body.parts, subject.body.smooth, subject.body.fillets)
+    _ = body.grids
+    start = time.perf_counter()
+    space = body.empty_space
+    return {
+        "seconds": time.perf_counter() - start,
+        "grids": sum(array.nbytes for array in body.grids) / 1e6,
+        "space": sum(array.nbytes for array in space) / 1e6,
+        "colours": subject.colours.megabytes,
+    }
+
+
+def report() -> str:
+    """The whole page."""
+    everything = subjects()
+    lines = [
+        "# Frames a second",
+        "",
+        "Written by `python -m tests.benchmarks.frames`. Median over a turntable of "
+        f"{len(YAWS)} orthographic views, the better of two runs each; the figure's height fills the frame, close-ups show "
+        f"{CLOSE:.0%} of it. *Colour* has normals, drawing, plain pictures and their blend; *all* adds depth, parts and "
+        "normals as pictures. *Embree* is Open3D's `RaycastingScene` with the same rays on the isosurface of the same "
+        f"field ({SPACING} units), in turn with ours; the ratio is ours over Embree's, median of pairs.",
+        "",
+        f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, Python {platform.python_version()}.",
+        "",
+        "| figure | size | filled | depth /s | normals /s | colour /s | all /s | Embree /s | colour : Embree | normals : Embree "
+        "| cells a ray |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    per_size: dict[tuple[int, bool], list[dict[str, float]]] = {}
+    for close in (False, True):
+        for size in SIZES:
+            for subject in everything:
+                found = measure(subject, size, close)
+                per_size.setdefault((size, close), []).append(found)
+                label = f"{subject.name}{', close' if close else ''}"
+                lines.append(_row(label, size, found))
+                print(lines[-1], file=sys.stderr)
+            keys = per_size[size, close][0]
+            median = {key: statistics.median(one[key] for one in per_size[size, close]) for key in keys}
+            lines.append(_row(f"**median{', close' if close else ''}**", size, median))
+    lines += ["", "| figure | triangles of the isosurface | preparation s | grids MB | empty space MB | pictures MB |"]
+    lines += ["|---|---|---|---|---|---|"]
+    for subject in everything:
+        made = preparation(subject)
+        lines.append(
+            f"| {subject.name} | {_scenes[subject.name][1]:,} | {made['seconds']:.2f} | {made['grids']:.1f} | "
+            f"{made['space']:.1f} | {made['colours']:.1f} |"
+        )
+    cold, warm = first_use()
+    lines += ["", f"First coloured frame of a process: {cold:.1f} s while kernels are compiled, {warm:.1f} s from then on."]
+    return "\n".join(lines) + "\n"
+
+
+def _row(label: str, size: int, found: dict[str, float]) -> str:
+    rates = " | ".join(f"{1 / found[name]:.0f}" for name in ("depth", "normals", "colour", "all", "embree"))
+    return (
+        f"| {label} | {size}² | {found['filled']:.0%} | {rates} | {found['ratio']:.2f} | {found['ratio_normals']:.2f} "
+        f"| {found['cells']:.1f} |"
+    )
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/frames.md")
+    page = report()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(page)
+    print(page)
