@@ -8,33 +8,36 @@ and rays went cell by cell: 50 to 80 cells for each pixel hit.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.field.compiled import run_blocks, sealed
+from fig2mesh.field.compiled import helper, run_blocks, sealed
 from fig2mesh.field.grids import Grids
 
 FARTHEST = 255
 
 BRICK = 4
-"""Cells along the edge of a brick."""
+"""Cells along the edge of a brick; `cell_index` relies on it."""
 
 
 class EmptySpace(NamedTuple):
-    """What is known of the cells of `Grids`; cell (i, j, k) has the index of its lowest node.
+    """What is known of the cells of `Grids`.
 
-    free : (sum n^3,) uint8, distance in cells to the nearest occupied cell of the grid, 0 if it is one. Distances are
-        the chessboard's: where the value is d > 0, all cells that differ by less than d in each index are empty.
-        Outside of the negative region's box the value is 1
+    free : (sum (4 m)^3,) uint8, distance in cells to the nearest occupied cell of the grid, 0 if it is one. Distances
+        are the chessboard's: where the value is d > 0, all cells that differ by less than d in each index are empty.
+        Outside of the negative region's box the value is 1. The cells of a brick lie together, 64 bytes, as
+        `cell_index` says: rays then stay in one line of the cache for some steps
+    free_starts : (G,) int64, where the values of a grid begin
     bricks : (K, 2, 3) float64, FIGURE, boxes that together hold all places where a ray can enter the solid: the cells
         with values of both signs, and those on a face of the cube, gathered by bricks of `BRICK` cells an edge
     brick_starts : (G + 1,) int64, where the bricks of each grid begin
     """
 
     free: NDArray[np.uint8]
+    free_starts: NDArray[np.int64]
     bricks: NDArray[np.float64]
     brick_starts: NDArray[np.int64]
 
@@ -42,22 +45,40 @@ class EmptySpace(NamedTuple):
 def empty_space(grids: Grids) -> EmptySpace:
     """Look at all grids once; some 10 ms for each."""
     count = len(grids.sizes)
-    free = np.ones(len(grids.values), np.uint8)
+    lengths = (BRICK * _across(grids.sizes)) ** 3
+    ends = np.cumsum(lengths)
+    free = np.ones(lengths.sum(), np.uint8)
     bricks = [np.zeros((0, 2, 3))] * count
 
     def run(first: int, step: int) -> None:
         for g in range(first, count, step):
             if grids.boxes[g, 0, 0] <= grids.boxes[g, 1, 0]:
-                bricks[g] = _look(grids, g, free)
+                bricks[g] = _look(grids, g, free[ends[g] - lengths[g] : ends[g]])
 
     run_blocks(run, count, 1)
     starts = np.cumsum([0, *(len(some) for some in bricks)])
     together = np.concatenate([np.zeros((0, 2, 3)), *bricks])
-    return EmptySpace(sealed(free, np.uint8), sealed(together, np.float64), sealed(starts, np.int64))
+    return EmptySpace(
+        sealed(free, np.uint8),
+        sealed(ends - lengths, np.int64),
+        sealed(together, np.float64),
+        sealed(starts, np.int64),
+    )
+
+
+def _across(nodes: Any) -> Any:
+    """Bricks along the edge of a grid."""
+    return -(-(nodes - 1) // BRICK)
+
+
+@helper
+def cell_index(across: int, i: int, j: int, k: int) -> int:
+    """Where a grid of so many bricks an edge has cell (i, j, k), from its start in `EmptySpace.free`."""
+    return ((((i >> 2) * across + (j >> 2)) * across + (k >> 2)) << 6) + ((i & 3) << 4) + ((j & 3) << 2) + (k & 3)
 
 
 def _look(grids: Grids, g: int, free: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Fill in `free` for grid g, and return its bricks."""
+    """Fill in the values `free` of grid g, and return its bricks."""
     n, start = int(grids.sizes[g]), int(grids.starts[g])
     box = (grids.boxes[g] - grids.origins[g]) / grids.spacings[g]
     low = np.clip(np.floor(box[0]).astype(int) - 1, 0, n - 2)
@@ -67,7 +88,10 @@ def _look(grids: Grids, g: int, free: NDArray[np.uint8]) -> NDArray[np.float64]:
     negative = grids.values[start : start + n**3].reshape(n, n, n)[nodes] <= 0
     occupied, filled = _over_corners(negative, np.logical_or), _over_corners(negative, np.logical_and)
     distance = ndimage.distance_transform_cdt(~occupied, "chessboard")
-    free[start : start + n**3].reshape(n, n, n)[cells] = np.minimum(distance, FARTHEST)
+    across = int(_across(n))
+    dense = np.ones((BRICK * across,) * 3, np.uint8)
+    dense[cells] = np.minimum(distance, FARTHEST)
+    free[:] = dense.reshape(across, BRICK, across, BRICK, across, BRICK).transpose(0, 2, 4, 1, 3, 5).ravel()
     places = np.argwhere(occupied)
     within = filled[tuple(places.T)]
     places += low

@@ -21,7 +21,13 @@ Triple = tuple[float, float, float]
 @helper
 def cell_of(x: float, n: int) -> int:
     """Index of the cell (0 to n-2) that holds grid coordinate x; the outermost cells take what lies beyond."""
-    return min(max(math.floor(x), 0), n - 2)
+    return min(int(max(x, 0.0)), n - 2)
+
+
+@helper
+def node(values: NDArray[np.float32], at: int) -> float:
+    """The value of a node; unsigned, or each look-up would first ask whether the index counts from the end."""
+    return np.float64(values[np.uint64(at)])
 
 
 @helper
@@ -55,10 +61,10 @@ def axis_slopes(
     for corner in range(4):
         weight = (v if corner & 1 else 1 - v) * (w if corner & 2 else 1 - w)
         e = at + (corner & 1) * s + (corner >> 1) * r
-        f1 = np.float64(values[e])
-        f2 = np.float64(values[e + stride])
-        f0 = np.float64(values[e - stride]) if i > 0 else 2 * f1 - f2  # one-sided at the faces of the cube
-        f3 = np.float64(values[e + 2 * stride]) if i < n - 2 else 2 * f2 - f1
+        f1 = node(values, e)
+        f2 = node(values, e + stride)
+        f0 = node(values, e - stride) if i > 0 else 2 * f1 - f2  # one-sided at the faces of the cube
+        f3 = node(values, e + 2 * stride) if i < n - 2 else 2 * f2 - f1
         smooth += weight * 0.5 * ((f2 - f0) * (1 - u) + (f3 - f1) * u)
         exact += weight * (f2 - f1)
     return smooth, exact

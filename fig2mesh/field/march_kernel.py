@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.compiled import helper
-from fig2mesh.field.empty_space import EmptySpace
-from fig2mesh.field.grid_kernels import cell_of, grid_gradient
+from fig2mesh.field.empty_space import EmptySpace, cell_index
+from fig2mesh.field.grid_kernels import cell_of, grid_gradient, node
 from fig2mesh.field.grids import Grids
 
 FAR = 1e30
@@ -80,45 +80,45 @@ def reciprocal(d: float) -> float:
 
 @helper
 def march(
-    grids: Grids,
-    space: EmptySpace,
-    g: int,
-    ox: float,
-    oy: float,
-    oz: float,
-    dx: float,
-    dy: float,
-    dz: float,
+    values: NDArray[np.float32],
+    base: int,
+    free_cells: NDArray[np.uint8],
+    cells: int,
+    n: int,
+    ux: float,
+    uy: float,
+    uz: float,
+    wx: float,
+    wy: float,
+    wz: float,
+    rx: float,
+    ry: float,
+    rz: float,
     t: float,
     end: float,
     tolerance: float,
     max_steps: int,
 ) -> tuple[float, int]:
-    """First t in [t, end] where grid g is not positive along o + t d, infinite if nowhere; and the cells looked at.
+    """First t in [t, end] where a grid is not positive along u + t w, infinite if nowhere; and the cells looked at.
 
     From an empty cell the ray goes to where it leaves the block of empty cells around it. An occupied cell is settled
     exactly, as a cubic along the ray. So every step passes at least one cell, a grazing ray cannot run out of steps,
     and no limb is thin enough to be stepped over, whatever the values are.
 
-    space : `empty_space` of the grids
+    values, base, n : the grid's nodes and where they begin, `Grids`; free_cells, cells : the same of `EmptySpace.free`.
+        Single arrays, because a record of many costs more to hand over than a step of the march
+    u, w, r : start and direction in grid coordinates, and one over the direction
     """
-    n = grids.sizes[g]
-    values = grids.values
-    base = grids.starts[g]
-    scale = 1.0 / grids.spacings[g]
-    ux, uy, uz = (ox - grids.origins[g, 0]) * scale, (oy - grids.origins[g, 1]) * scale, (oz - grids.origins[g, 2]) * scale
-    wx, wy, wz = dx * scale, dy * scale, dz * scale
     # The plane through which a block of f cells is left lies at i + f or at i + 1 - f.
-    rx, ry, rz = reciprocal(wx), reciprocal(wy), reciprocal(wz)
     sx, sy, sz = 1 if wx > 0.0 else -1, 1 if wy > 0.0 else -1, 1 if wz > 0.0 else -1
     px, py, pz = (0.0 if wx > 0.0 else 1.0) - ux, (0.0 if wy > 0.0 else 1.0) - uy, (0.0 if wz > 0.0 else 1.0) - uz
     last = float(n - 1)
+    across = (n + 2) >> 2
     i, j, k = cell_of(ux + t * wx, n), cell_of(uy + t * wy, n), cell_of(uz + t * wz, n)
     steps = 0
     while steps < max_steps:
         steps += 1
-        e = base + (i * n + j) * n + k
-        free = np.int64(space.free[e])
+        free = np.int64(free_cells[np.uint64(cells + cell_index(across, i, j, k))])
         f = max(free, 1)
         tx = (i + sx * f + px) * rx if wx != 0.0 else FAR
         ty = (j + sy * f + py) * ry if wy != 0.0 else FAR
@@ -128,19 +128,10 @@ def march(
             x = min(max(ux + t * wx, 0.0), last) - i
             y = min(max(uy + t * wy, 0.0), last) - j
             z = min(max(uz + t * wz, 0.0), last) - k
-            f000, f001, f010, f011 = (
-                np.float64(values[e]),
-                np.float64(values[e + 1]),
-                np.float64(values[e + n]),
-                np.float64(values[e + n + 1]),
-            )
+            e = base + (i * n + j) * n + k
+            f000, f001, f010, f011 = node(values, e), node(values, e + 1), node(values, e + n), node(values, e + n + 1)
             e += n * n
-            f100, f101, f110, f111 = (
-                np.float64(values[e]),
-                np.float64(values[e + 1]),
-                np.float64(values[e + n]),
-                np.float64(values[e + n + 1]),
-            )
+            f100, f101, f110, f111 = node(values, e), node(values, e + 1), node(values, e + n), node(values, e + n + 1)
             # the interpolant as a polynomial in the cell's coordinates
             kz, ky, kx = f001 - f000, f010 - f000, f100 - f000
             kyz, kxz, kxy = f011 - f010 - kz, f101 - f100 - kz, f110 - f100 - ky
@@ -174,6 +165,50 @@ def march(
         if i < 0 or j < 0 or k < 0 or i > n - 2 or j > n - 2 or k > n - 2:
             break
     return math.inf, steps
+
+
+@helper
+def march_grid(
+    grids: Grids,
+    space: EmptySpace,
+    g: int,
+    ox: float,
+    oy: float,
+    oz: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    rx: float,
+    ry: float,
+    rz: float,
+    t: float,
+    end: float,
+    tolerance: float,
+    max_steps: int,
+) -> tuple[float, int]:
+    """`march` through grid g along o + t d, FIGURE; r : one over d."""
+    h = grids.spacings[g]
+    scale = 1.0 / h
+    return march(
+        grids.values,
+        grids.starts[g],
+        space.free,
+        space.free_starts[g],
+        grids.sizes[g],
+        (ox - grids.origins[g, 0]) * scale,
+        (oy - grids.origins[g, 1]) * scale,
+        (oz - grids.origins[g, 2]) * scale,
+        dx * scale,
+        dy * scale,
+        dz * scale,
+        rx * h,
+        ry * h,
+        rz * h,
+        t,
+        end,
+        tolerance,
+        max_steps,
+    )
 
 
 @helper
@@ -225,7 +260,9 @@ def first_hit(
         if entry[g] >= best:
             break
         end = min(leave[g], best)
-        t, used = march(grids, space, g, ox, oy, oz, dx, dy, dz, entry[g], end, tolerance, max_steps)
+        t, used = march_grid(
+            grids, space, g, ox, oy, oz, dx, dy, dz, rx, ry, rz, entry[g], end, tolerance, max_steps
+        )
         spent += used
         if t < best:
             best = t

@@ -16,7 +16,7 @@ from fig2mesh.field.compiled import helper, kernel
 from fig2mesh.field.empty_space import EmptySpace
 from fig2mesh.field.grid_kernels import owner_at
 from fig2mesh.field.grids import Grids
-from fig2mesh.field.march_kernel import FAR, march, reciprocal, unit_normal
+from fig2mesh.field.march_kernel import FAR, march_grid, reciprocal, unit_normal
 from fig2mesh.render.surface_colours import BAND, HIDDEN, STEEPEST, Colouring
 
 TILE = 8
@@ -242,7 +242,7 @@ def first_hit_of_tile(
         a = max(min(ax, bx), min(ay, by), min(az, bz), near[candidate])
         b = min(max(ax, bx), max(ay, by), max(az, bz), np.float64(spans[g, tile_row, tile_column, 1]), best)
         if a <= b:
-            t, used = march(grids, space, g, ox, oy, oz, dx, dy, dz, a, b, tolerance, 1 << 30)
+            t, used = march_grid(grids, space, g, ox, oy, oz, dx, dy, dz, rx, ry, rz, a, b, tolerance, 1 << 30)
             cells += used
             if t < best:
                 best = t
