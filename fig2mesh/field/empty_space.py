@@ -96,7 +96,8 @@ def _look(grids: Grids, g: int, free: NDArray[np.uint8]) -> NDArray[np.float64]:
     within = filled[tuple(places.T)]
     places += low
     on_face = ((places == 0) | (places == n - 2)).any(axis=1)
-    return grids.origins[g] + _bricks(places[on_face | ~within]) * grids.spacings[g]
+    bricks: NDArray[np.float64] = grids.origins[g] + _bricks(places[on_face | ~within]) * grids.spacings[g]
+    return bricks
 
 
 def _bricks(cells: NDArray[np.intp]) -> NDArray[np.float64]:

@@ -118,7 +118,9 @@ def march(
     steps = 0
     while steps < max_steps:
         steps += 1
-        free = np.int64(free_cells[np.uint64(cells + cell_index(across, i, j, k))])
+        free = int(
+            np.int64(free_cells[np.uint64(cells + cell_index(across, i, j, k))])
+        )  # int alone would make it unsigned, and sums with it floats
         f = max(free, 1)
         tx = (i + sx * f + px) * rx if wx != 0.0 else FAR
         ty = (j + sy * f + py) * ry if wy != 0.0 else FAR
@@ -229,7 +231,7 @@ def first_hit(
     tolerance: float,
     max_steps: int,
 ) -> tuple[float, int, int]:
-    """Smallest t at which o + t d meets the first `candidates` grids of `found`, that grid (-1 if none), cells looked at.
+    """Smallest t at which o + t d meets one of `candidates` grids in `found`, that grid (or -1), and cells looked at.
 
     Each grid is marched only inside of the box around its negative region, nearest box first.
 
@@ -260,9 +262,7 @@ def first_hit(
         if entry[g] >= best:
             break
         end = min(leave[g], best)
-        t, used = march_grid(
-            grids, space, g, ox, oy, oz, dx, dy, dz, rx, ry, rz, entry[g], end, tolerance, max_steps
-        )
+        t, used = march_grid(grids, space, g, ox, oy, oz, dx, dy, dz, rx, ry, rz, entry[g], end, tolerance, max_steps)
         spent += used
         if t < best:
             best = t

@@ -86,9 +86,7 @@ def seen_box(view: View, box: NDArray[np.float64]) -> tuple[float, float, float,
 
 
 @kernel
-def span_bricks(
-    grids: Grids, space: EmptySpace, view: View, first: int, step: int, spans: NDArray[np.float32]
-) -> None:
+def span_bricks(grids: Grids, space: EmptySpace, view: View, first: int, step: int, spans: NDArray[np.float32]) -> None:
     """Fill `spans` (G, tiles down, tiles across, 2) for the grids `first, first + step, ...`.
 
     A span holds the depths between which rays of the tile can enter the grid's solid; (inf, -inf) where none can. A
@@ -113,9 +111,9 @@ def span_bricks(
             first_row, last_row = max(top - _EDGE, 0.0), min(bottom + _EDGE, view.rows - 1.0)
             if first_column > last_column or first_row > last_row:
                 continue
-            near, far = np.float32(near - _SLACK * abs(near)), np.float32(far + _SLACK * abs(far))
-            for row in range(int(math.ceil(first_row)) // TILE, min(int(last_row) // TILE, down - 1) + 1):
-                for column in range(int(math.ceil(first_column)) // TILE, min(int(last_column) // TILE, across - 1) + 1):
+            near, far = near - _SLACK * abs(near), far + _SLACK * abs(far)
+            for row in range(math.ceil(first_row) // TILE, min(int(last_row) // TILE, down - 1) + 1):
+                for column in range(math.ceil(first_column) // TILE, min(int(last_column) // TILE, across - 1) + 1):
                     if near < spans[g, row, column, 0]:
                         spans[g, row, column, 0] = near
                     if far > spans[g, row, column, 1]:
@@ -140,7 +138,7 @@ def bilinear(picture: NDArray[np.uint8], x: float, y: float) -> tuple[float, flo
 
 @helper
 def openness(front: NDArray[np.float32], x: float, y: float, limit: float) -> float:
-    """Share, 0 to 1, of the map's four pixels about (x, y) in which the body reaches no further forward than `limit`."""
+    """Share, 0 to 1, of the map's four pixels about (x, y) where the body reaches no further forward than `limit`."""
     x = min(max(x, 0.0), front.shape[1] - 1.0)
     y = min(max(y, 0.0), front.shape[0] - 1.0)
     i, j = int(x), int(y)
@@ -290,14 +288,14 @@ def render_tile(
             px, py, pz = ox + t * dx, oy + t * dy, oz + t * dz
             if parts is not None:
                 parts[row, column] = owner_at(grids, hit, px, py, pz)
-            if colouring is not None or normals is not None:
+            if colour is not None or normals is not None:
                 nx, ny, nz = unit_normal(grids, hit, px, py, pz, dx, dy, dz)
                 computed += 1
                 if normals is not None:
                     normals[row, column, 0] = nx
                     normals[row, column, 1] = ny
                     normals[row, column, 2] = nz
-                if colouring is not None:
+                if colour is not None and colouring is not None:
                     part = owner_at(grids, hit, px, py, pz)
                     red, green, blue, looked = surface_colour(colouring, part, px, py, pz, nz)
                     samples += looked

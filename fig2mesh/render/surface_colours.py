@@ -89,8 +89,8 @@ class SurfaceColours:
     @cached_property
     def megabytes(self) -> float:
         """Memory of all pictures, MB."""
-        arrays = (*self.seen, *self.plain, self.front)
-        return sum(array.nbytes for array in arrays) / 1e6
+        pictures = sum(picture.nbytes for picture in (*self.seen, *self.plain))
+        return (pictures + self.front.nbytes) / 1e6
 
 
 def surface_colours(body: Body, sources: Sources, frame: ImageFrame) -> SurfaceColours:

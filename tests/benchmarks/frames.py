@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,12 @@ CLOSE = 0.45
 """Height of the close-up relative to that."""
 SPACING = 0.01
 """Of the isosurface, FIGURE units: what the run benchmark uses."""
-WANTS = {"depth": {"depth"}, "normals": {"depth", "normals"}, "colour": {"colour"}, "all": {"colour", "depth", "normals", "parts"}}
+WANTS = {
+    "depth": {"depth"},
+    "normals": {"depth", "normals"},
+    "colour": {"colour"},
+    "all": {"colour", "depth", "normals", "parts"},
+}
 
 
 @dataclass(frozen=True)
@@ -60,9 +66,7 @@ def subjects() -> list[Subject]:
     found = [Subject("mannequin", body, surface_colours(body, sources, ImageFrame((500.0, 500.0), 0.002)))]
     for name in ("farmer", "market_woman"):
         folder = FIGURES / name
-        results: dict[str, Any] = {
-            "figure": read_figure(folder / "image.png", keypoints=folder / "keypoints.json")
-        }
+        results: dict[str, Any] = {"figure": read_figure(folder / "image.png", keypoints=folder / "keypoints.json")}
         for step in steps(PRESETS["standard"], 1.79):
             if step.name in ("lift", "parts", "body", "textures"):
                 results[step.name] = step.run(*(results[need] for need in step.needs))
@@ -89,10 +93,10 @@ def measure(subject: Subject, size: int, close: bool) -> dict[str, float]:
         packed = o3d.core.Tensor.from_numpy(np.concatenate([rays.origins, rays.directions], axis=1))
         frame = None
         for name, want in WANTS.items():
-            take = lambda want=want: render_frame(subject.body, camera, colours=subject.colours, want=want)  # noqa: E731
+            take = partial(render_frame, subject.body, camera, colours=subject.colours, want=want)
             seconds, frame = _timed(take)
             times[name].append(seconds)
-        times["embree"].append(_timed(lambda packed=packed: scene.cast_rays(packed))[0])
+        times["embree"].append(_timed(partial(scene.cast_rays, packed))[0])
         counts.append((frame.counts.cells / max(frame.counts.rays, 1), frame.counts.rays / size**2))
         shares.append(np.isfinite(frame.depth).mean())
     result = {name: statistics.median(some) for name, some in times.items()}
@@ -144,7 +148,9 @@ def first_use() -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
         cold, warm = (
-            float(subprocess.run([sys.executable, "-c", script], env=environment, check=True, capture_output=True).stdout)
+            float(
+                subprocess.run([sys.executable, "-c", script], env=environment, check=True, capture_output=True).stdout
+            )
             for _ in range(2)
         )
     return cold, warm
@@ -186,15 +192,17 @@ def report() -> str:
         "# Frames a second",
         "",
         "Written by `python -m tests.benchmarks.frames`. Median over a turntable of "
-        f"{len(YAWS)} orthographic views, the better of two runs each; the figure's height fills the frame, close-ups show "
-        f"{CLOSE:.0%} of it. *Colour* has normals, drawing, plain pictures and their blend; *all* adds depth, parts and "
-        "normals as pictures. *Embree* is Open3D's `RaycastingScene` with the same rays on the isosurface of the same "
-        f"field ({SPACING} units), in turn with ours; the ratio is ours over Embree's, median of pairs.",
+        f"{len(YAWS)} orthographic views, the",
+        f"better of two runs each; the figure's height fills the frame, close-ups show {CLOSE:.0%} of it. *Colour* has",
+        "normals, drawing, plain pictures and their blend; *all* adds depth, parts and normals as pictures. *Embree*",
+        "is Open3D's `RaycastingScene` with the same rays on the isosurface of the same field, in turn with ours; the",
+        "ratio is ours over Embree's, median of pairs. The isosurface's grid has nodes",
+        f"{SPACING} units apart, halved where limbs are thinner.",
         "",
         f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, Python {platform.python_version()}.",
         "",
-        "| figure | size | filled | depth /s | normals /s | colour /s | all /s | Embree /s | colour : Embree | normals : Embree "
-        "| cells a ray |",
+        "| figure | size | filled | depth /s | normals /s | colour /s | all /s | Embree /s | colour : Embree "
+        "| normals : Embree | cells a ray |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     per_size: dict[tuple[int, bool], list[dict[str, float]]] = {}
@@ -218,7 +226,10 @@ def report() -> str:
             f"{made['space']:.1f} | {made['colours']:.1f} |"
         )
     cold, warm = first_use()
-    lines += ["", f"First coloured frame of a process: {cold:.1f} s while kernels are compiled, {warm:.1f} s from then on."]
+    lines += [
+        "",
+        f"First coloured frame of a process: {cold:.1f} s while kernels are compiled, {warm:.1f} s from then on.",
+    ]
     return "\n".join(lines) + "\n"
 
 

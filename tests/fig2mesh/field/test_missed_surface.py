@@ -1,7 +1,7 @@
 """No surface is missed: 10,000 rays each through what is hard to hit, against a brute-force march.
 
-The march takes 60 to 150 samples a cell. It can only overlook chords shorter than a sample, so a hit of the tracer that it
-does not confirm is looked at again, a thousand times as finely, about the place of the hit.
+The march takes 35 to 60 samples a cell and so overlooks shorter chords. Where it does not confirm a hit, the field is
+looked at again about the place of the hit, every 5e-8.
 """
 
 from __future__ import annotations

@@ -96,6 +96,17 @@ def test_rays_that_start_inside_of_parts_and_between_them(perspective, distance)
     agree(render_frame(body, view, want=ALL - {"colour"}, tolerance=1e-6), trace(body, view.rays(), tolerance=1e-6))
 
 
+@pytest.mark.parametrize("camera", CAMERAS, ids=str)
+def test_a_part_cut_by_its_cube_ends_there(camera):
+    """Faces of the cube, behind which all cells are inside, are met too."""
+    part, more = analytic.sample(analytic.sphere((0, 0, 0), 0.5), 1, (0, 0, 0), 0.5, 24), dict(camera)
+    view = looking(Body((part,)), more.pop("yaw"), **more)
+    agree(
+        render_frame(Body((part,)), view, want=ALL - {"colour"}, tolerance=1e-6),
+        trace(Body((part,)), view.rays(), tolerance=1e-6),
+    )
+
+
 def test_only_what_is_wanted_is_computed():
     body, view = pair(), looking(pair(), 30.0)
     colours = surface_colours(body, drawing(), FRAME)
@@ -191,9 +202,9 @@ def test_the_back_is_plain_and_hidden_places_are_not_smeared(coloured):
     assert frame.colour is not None
     assert frame.depth is not None
     rays = view.rays()
-    points = (rays.origins + np.where(np.isfinite(frame.depth), frame.depth, 0).reshape(-1, 1) * rays.directions).reshape(
-        200, 200, 3
-    )
+    points = (
+        rays.origins + np.where(np.isfinite(frame.depth), frame.depth, 0).reshape(-1, 1) * rays.directions
+    ).reshape(200, 200, 3)
     behind = (frame.parts == 0) & (np.abs(points[..., 0]) < 0.25) & (np.abs(points[..., 1] - 0.2) < 0.06)
     behind &= points[..., 2] > 0
     assert behind.sum() > 20
