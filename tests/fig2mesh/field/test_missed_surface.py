@@ -52,7 +52,8 @@ def grazing(seed: int = 0) -> tuple[Body, Rays]:
     origins *= 1.5 / np.linalg.norm(origins, axis=1, keepdims=True)
     side = np.cross(origins, rng.normal(size=(RAYS, 3)))
     side /= np.linalg.norm(side, axis=1, keepdims=True)
-    return Body((part,)), towards(middle + origins, middle + side * (0.4 + rng.uniform(-0.5, 0.5, (RAYS, 1)) * cell))
+    middle = middle + side * (0.4 + rng.uniform(-0.5, 0.5, (RAYS, 1)) * cell)
+    return Body((part,)), towards(middle + origins, middle)
 
 
 def overestimated(seed: int = 0) -> tuple[Body, Rays]:
