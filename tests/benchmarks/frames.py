@@ -41,12 +41,12 @@ WANTS = {
 
 
 INTRODUCTION = f"""\
-Written by `python -m tests.benchmarks.frames`. Medians over a turntable of {len(YAWS)} orthographic views, best of {RUNS}
-runs each; the figure's height fills the frame, close-ups show {CLOSE:.0%} of it. *Colour* has normals, drawing, plain
-pictures and their blend; *all* adds depth, parts and normals as pictures. *Embree* is Open3D's `RaycastingScene` with the
-same rays on the isosurface of the same field, in turn with ours; the ratio is ours over Embree's, median of pairs. The
-isosurface's grid has nodes {SPACING} units apart, less where limbs are thin. *Processor ms* is the time of all cores
-together, which other work on the machine changes less.
+Written by `python -m tests.benchmarks.frames`. Medians over a turntable of {len(YAWS)} orthographic views, best of
+{RUNS} runs each; the figure's height fills the frame, close-ups show {CLOSE:.0%} of it. *Colour* has normals, drawing,
+plain pictures and their blend; *all* adds depth, parts and normals as pictures. *Embree* is Open3D's `RaycastingScene`
+with the same rays on the isosurface of the same field, in turn with ours; the ratio is ours over Embree's, median of
+pairs. The isosurface's grid has nodes {SPACING} units apart, less where limbs are thin. *Processor ms* is the time of
+all cores together, which other work on the machine changes less.
 """
 
 
