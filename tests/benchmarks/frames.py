@@ -1,4 +1,4 @@
-"""Measure frames a second on a turntable: `python -m tests.benchmarks.frames [OUT.md]`.
+"""Measure frames a second on a turntable: `python -m tests.benchmarks.frames [OUT.md [VIEWS]]`.
 
 Writes a Markdown table, by default docs/frames.md. Embree (Open3D's RaycastingScene) casts the same rays at the
 isosurface mesh of the same field, frame by frame in turn with ours. Machines differ and are noisy: compare ratios
@@ -23,11 +23,13 @@ import numpy as np
 
 FIGURES = Path(__file__).parents[2] / "examples" / "figures"
 SIZES = (256, 512, 1024)
-YAWS = tuple(range(0, 360, 10))
+VIEWS = 36
+"""Of the turntable."""
 MARGIN = 0.01
 """Free border, share of the picture: the figure's height fills the frame."""
 CLOSE = 0.45
 """Height of the close-up relative to that."""
+CLOSE_SIZE = 512
 RUNS = 3
 """Of each frame, the first to warm the caches."""
 SPACING = 0.01
@@ -40,12 +42,12 @@ WANTS = {
 }
 
 
-INTRODUCTION = f"""\
-Written by `python -m tests.benchmarks.frames`. Medians over a turntable of {len(YAWS)} orthographic views, best of
-{RUNS} runs each; the figure's height fills the frame, close-ups show {CLOSE:.0%} of it. *Colour* has normals, drawing,
+INTRODUCTION = """\
+Written by `python -m tests.benchmarks.frames`. Medians over a turntable of {views} orthographic views, best of
+{runs} runs each; the figure's height fills the frame, close-ups show {close:.0%} of it. *Colour* has normals, drawing,
 plain pictures and their blend; *all* adds depth, parts and normals as pictures. *Embree* is Open3D's `RaycastingScene`
 with the same rays on the isosurface of the same field, in turn with ours; the ratio is ours over Embree's, median of
-pairs. The isosurface's grid has nodes {SPACING} units apart, less where limbs are thin. *Processor ms* is the time of
+pairs. The isosurface's grid has nodes {spacing} units apart, less where limbs are thin. *Processor ms* is the time of
 all cores together, which other work on the machine changes less.
 """
 
@@ -92,7 +94,7 @@ def drawn(name: str) -> Subject:
     return Subject(name.replace("_", " "), results["body"], colours)
 
 
-def measure(subject: Subject, size: int, close: bool) -> dict[str, float]:
+def measure(subject: Subject, size: int, close: bool = False, views: int = VIEWS) -> dict[str, float]:
     """Median seconds of a frame for each of `WANTS` and Embree, and counts, over the turntable."""
     import open3d as o3d
 
@@ -102,7 +104,7 @@ def measure(subject: Subject, size: int, close: bool) -> dict[str, float]:
     scene = _scene(subject)
     times: dict[str, list[float]] = {name: [] for name in (*WANTS, "embree")}
     counts, shares, spent = [], [], []
-    for yaw in YAWS:
+    for yaw in np.arange(views) * (360.0 / views):
         centre, height = framing(subject.body.bounds(), (size, size), yaw, margin=MARGIN)
         camera = FrameCamera(yaw, size=(size, size), height=height * (CLOSE if close else 1.0), centre=centre)
         rays = camera.rays()
@@ -204,13 +206,14 @@ def preparation(subject: Subject) -> dict[str, float]:
     }
 
 
-def report() -> str:
+def report(views: int) -> str:
     """The whole page."""
+    load = [os.getloadavg()[0]]
     everything = subjects()
     lines = [
         "# Frames a second",
         "",
-        INTRODUCTION,
+        INTRODUCTION.format(views=views, runs=RUNS, close=CLOSE, spacing=SPACING),
         f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, Python {platform.python_version()}.",
         "",
         "| figure | size | filled | depth /s | normals /s | colour /s | all /s | Embree /s | colour : Embree "
@@ -219,9 +222,10 @@ def report() -> str:
     ]
     per_size: dict[tuple[int, bool], list[dict[str, float]]] = {}
     for close in (False, True):
-        for size in SIZES:
+        load.append(os.getloadavg()[0])
+        for size in SIZES if not close else (CLOSE_SIZE,):
             for subject in everything:
-                found = measure(subject, size, close)
+                found = measure(subject, size, close, views)
                 per_size.setdefault((size, close), []).append(found)
                 label = f"{subject.name}{', close' if close else ''}"
                 lines.append(_row(label, size, found))
@@ -242,6 +246,8 @@ def report() -> str:
         "",
         f"First coloured frame of a process: {cold:.1f} s while kernels are compiled, {warm:.1f} s from then on.",
     ]
+    load.append(os.getloadavg()[0])
+    lines += [f"Load of the machine on the way: {', '.join(f'{one:.1f}' for one in load)}; ours alone makes at most 2."]
     return "\n".join(lines) + "\n"
 
 
@@ -255,7 +261,7 @@ def _row(label: str, size: int, found: dict[str, float]) -> str:
 
 if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/frames.md")
-    page = report()
+    page = report(int(sys.argv[2]) if len(sys.argv) > 2 else VIEWS)
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(page)
     print(page)

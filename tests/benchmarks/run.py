@@ -62,13 +62,13 @@ def whole_figures(folder: Path) -> dict[str, dict[str, Any]]:
 
 def tracing() -> dict[str, dict[str, Any]]:
     """Frames a second of a turntable with normals and colours, and Embree on the isosurface of the field beside it."""
-    from tests.benchmarks.frames import YAWS, drawn, measure
+    from tests.benchmarks.frames import VIEWS, drawn, measure
 
     farmer = drawn("farmer")
     found = {}
     for size in (256, 512):
-        seconds = measure(farmer, size, close=False)
-        how = f"{size}x{size}, trilinear, normals, colours blended, {len(YAWS)} views of the farmer, median"
+        seconds = measure(farmer, size)
+        how = f"{size}x{size}, trilinear, normals, colours blended, {VIEWS} views of the farmer, median"
         found[f"trace_fps_{size}"] = _value(1.0 / seconds["colour"], "1/s", how)
     how = "time per coloured frame over Embree's on triangles of the isosurface, 512x512, median of pairs"
     return {**found, "embree_ratio_512": _value(seconds["ratio"], "1", how)}
