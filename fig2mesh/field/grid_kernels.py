@@ -71,24 +71,28 @@ def axis_slopes(
 
 
 @helper
-def grid_gradient(grids: Grids, g: int, x: float, y: float, z: float) -> Triple:
-    """Gradient of grid g at grid coordinates, per FIGURE unit.
+def slopes_at(values: NDArray[np.float32], start: int, n: int, scale: float, x: float, y: float, z: float) -> Triple:
+    """Gradient at grid coordinates of the grid of n^3 nodes that begins at `start`; scale : nodes a FIGURE unit.
 
     Central differences one node wide (paper appendix C), which are continuous; where they cancel, as in a limb thinner
     than a cell, the interpolant's own gradient.
     """
-    n = grids.sizes[g]
     i, j, k = cell_of(x, n), cell_of(y, n), cell_of(z, n)
     u, v, w = x - i, y - j, z - k
-    at = grids.starts[g] + (i * n + j) * n + k
-    sx, ex = axis_slopes(grids.values, at, n * n, i, u, n, n, v, 1, w)
-    sy, ey = axis_slopes(grids.values, at, n, j, v, n, n * n, u, 1, w)
-    sz, ez = axis_slopes(grids.values, at, 1, k, w, n, n * n, u, n, v)
-    scale = 1.0 / grids.spacings[g]
+    at = start + (i * n + j) * n + k
+    sx, ex = axis_slopes(values, at, n * n, i, u, n, n, v, 1, w)
+    sy, ey = axis_slopes(values, at, n, j, v, n, n * n, u, 1, w)
+    sz, ez = axis_slopes(values, at, 1, k, w, n, n * n, u, n, v)
     # next to nothing of the exact slope is left, or the contrary: the differences straddle the limb
     if 10.0 * (sx * ex + sy * ey + sz * ez) < ex * ex + ey * ey + ez * ez:
         return ex * scale, ey * scale, ez * scale
     return sx * scale, sy * scale, sz * scale
+
+
+@helper
+def grid_gradient(grids: Grids, g: int, x: float, y: float, z: float) -> Triple:
+    """Gradient of grid g at grid coordinates, per FIGURE unit."""
+    return slopes_at(grids.values, grids.starts[g], grids.sizes[g], 1.0 / grids.spacings[g], x, y, z)
 
 
 @helper

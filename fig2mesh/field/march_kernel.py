@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.field.compiled import helper
 from fig2mesh.field.empty_space import EmptySpace, cell_index
-from fig2mesh.field.grid_kernels import cell_of, grid_gradient, node
+from fig2mesh.field.grid_kernels import cell_of, node, slopes_at
 from fig2mesh.field.grids import Grids
 
 FAR = 1e30
@@ -272,20 +272,27 @@ def first_hit(
 
 @helper
 def unit_normal(
-    grids: Grids, g: int, px: float, py: float, pz: float, dx: float, dy: float, dz: float
+    values: NDArray[np.float32],
+    start: int,
+    n: int,
+    x: float,
+    y: float,
+    z: float,
+    dx: float,
+    dy: float,
+    dz: float,
 ) -> tuple[float, float, float]:
-    """The field's normal at a point of grid g that a ray of direction d meets; where the field is flat, -d."""
-    scale = 1.0 / grids.spacings[g]
-    last = float(grids.sizes[g] - 1)
-    gx, gy, gz = grid_gradient(
-        grids,
-        g,
-        min(max((px - grids.origins[g, 0]) * scale, 0.0), last),
-        min(max((py - grids.origins[g, 1]) * scale, 0.0), last),
-        min(max((pz - grids.origins[g, 2]) * scale, 0.0), last),
+    """The field's normal at grid coordinates that a ray of direction d meets; where the field is flat, -d.
+
+    values, start, n : the grid's nodes and where they begin, `Grids`
+    """
+    last = float(n - 1)
+    gx, gy, gz = slopes_at(
+        values, start, n, 1.0, min(max(x, 0.0), last), min(max(y, 0.0), last), min(max(z, 0.0), last)
     )
     length = math.sqrt(gx * gx + gy * gy + gz * gz)
     if length == 0.0:
         gx, gy, gz = -dx, -dy, -dz
         length = math.sqrt(gx * gx + gy * gy + gz * gz)
-    return gx / length, gy / length, gz / length
+    scale = 1.0 / length
+    return gx * scale, gy * scale, gz * scale

@@ -100,4 +100,15 @@ def trace_blocks(
             part_index[ray] = owner_at(grids, hit, px, py, pz)
             points[ray, 0], points[ray, 1], points[ray, 2] = px, py, pz
             if with_normals:
-                normals[ray, 0], normals[ray, 1], normals[ray, 2] = unit_normal(grids, hit, px, py, pz, dx, dy, dz)
+                scale = 1.0 / grids.spacings[hit]
+                normals[ray, 0], normals[ray, 1], normals[ray, 2] = unit_normal(
+                    grids.values,
+                    grids.starts[hit],
+                    grids.sizes[hit],
+                    (px - grids.origins[hit, 0]) * scale,
+                    (py - grids.origins[hit, 1]) * scale,
+                    (pz - grids.origins[hit, 2]) * scale,
+                    dx,
+                    dy,
+                    dz,
+                )

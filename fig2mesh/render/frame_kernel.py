@@ -289,14 +289,27 @@ def render_tile(
             if parts is not None:
                 parts[row, column] = owner_at(grids, hit, px, py, pz)
             if colour is not None or normals is not None:
-                nx, ny, nz = unit_normal(grids, hit, px, py, pz, dx, dy, dz)
+                scale = 1.0 / grids.spacings[hit]
+                nx, ny, nz = unit_normal(
+                    grids.values,
+                    grids.starts[hit],
+                    grids.sizes[hit],
+                    (px - grids.origins[hit, 0]) * scale,
+                    (py - grids.origins[hit, 1]) * scale,
+                    (pz - grids.origins[hit, 2]) * scale,
+                    dx,
+                    dy,
+                    dz,
+                )
                 computed += 1
                 if normals is not None:
                     normals[row, column, 0] = nx
                     normals[row, column, 1] = ny
                     normals[row, column, 2] = nz
                 if colour is not None and colouring is not None:
-                    part = owner_at(grids, hit, px, py, pz)
+                    part = grids.owners[hit, 0]
+                    if part != grids.owners[hit, 1]:
+                        part = owner_at(grids, hit, px, py, pz)
                     red, green, blue, looked = surface_colour(colouring, part, px, py, pz, nz)
                     samples += looked
                     colour[row, column, 0] = np.uint8(red + 0.5)
