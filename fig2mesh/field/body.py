@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.field.blend import blend
 from fig2mesh.field.compiled import sealed
+from fig2mesh.field.empty_space import EmptySpace, empty_space
 from fig2mesh.field.evaluate import evaluate
 from fig2mesh.field.grids import Grids, pack
 from fig2mesh.records import BoolArray, ByteArray, FloatArray, IntArray, PartSdf
@@ -62,6 +63,11 @@ class Body:
             grids.append(fillet)
             owners.append((first, second))
         return pack(grids, owners)
+
+    @cached_property
+    def empty_space(self) -> EmptySpace:
+        """Where rays need not look; made for the first of them."""
+        return empty_space(self.grids)
 
     @cached_property
     def labels(self) -> ByteArray:

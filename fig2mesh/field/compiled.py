@@ -34,7 +34,7 @@ def kernel(function: Function) -> Function:
 
 def helper(function: Function) -> Function:
     """As `kernel`, for functions that only other kernels call: stored with those, and quicker to compile."""
-    bare = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    bare = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
     return cast(Function, bare(function))
 
 

@@ -21,7 +21,13 @@ Triple = tuple[float, float, float]
 @helper
 def cell_of(x: float, n: int) -> int:
     """Index of the cell (0 to n-2) that holds grid coordinate x; the outermost cells take what lies beyond."""
-    return min(max(math.floor(x), 0), n - 2)
+    return min(int(max(x, 0.0)), n - 2)
+
+
+@helper
+def node(values: NDArray[np.float32], at: int) -> float:
+    """The value of a node; unsigned, or each look-up would first ask whether the index counts from the end."""
+    return np.float64(values[np.uint64(at)])
 
 
 @helper
@@ -55,34 +61,38 @@ def axis_slopes(
     for corner in range(4):
         weight = (v if corner & 1 else 1 - v) * (w if corner & 2 else 1 - w)
         e = at + (corner & 1) * s + (corner >> 1) * r
-        f1 = np.float64(values[e])
-        f2 = np.float64(values[e + stride])
-        f0 = np.float64(values[e - stride]) if i > 0 else 2 * f1 - f2  # one-sided at the faces of the cube
-        f3 = np.float64(values[e + 2 * stride]) if i < n - 2 else 2 * f2 - f1
+        f1 = node(values, e)
+        f2 = node(values, e + stride)
+        f0 = node(values, e - stride) if i > 0 else 2 * f1 - f2  # one-sided at the faces of the cube
+        f3 = node(values, e + 2 * stride) if i < n - 2 else 2 * f2 - f1
         smooth += weight * 0.5 * ((f2 - f0) * (1 - u) + (f3 - f1) * u)
         exact += weight * (f2 - f1)
     return smooth, exact
 
 
 @helper
-def grid_gradient(grids: Grids, g: int, x: float, y: float, z: float) -> Triple:
-    """Gradient of grid g at grid coordinates, per FIGURE unit.
+def slopes_at(values: NDArray[np.float32], start: int, n: int, scale: float, x: float, y: float, z: float) -> Triple:
+    """Gradient at grid coordinates of the grid of n^3 nodes that begins at `start`; scale : nodes a FIGURE unit.
 
     Central differences one node wide (paper appendix C), which are continuous; where they cancel, as in a limb thinner
     than a cell, the interpolant's own gradient.
     """
-    n = grids.sizes[g]
     i, j, k = cell_of(x, n), cell_of(y, n), cell_of(z, n)
     u, v, w = x - i, y - j, z - k
-    at = grids.starts[g] + (i * n + j) * n + k
-    sx, ex = axis_slopes(grids.values, at, n * n, i, u, n, n, v, 1, w)
-    sy, ey = axis_slopes(grids.values, at, n, j, v, n, n * n, u, 1, w)
-    sz, ez = axis_slopes(grids.values, at, 1, k, w, n, n * n, u, n, v)
-    scale = 1.0 / grids.spacings[g]
+    at = start + (i * n + j) * n + k
+    sx, ex = axis_slopes(values, at, n * n, i, u, n, n, v, 1, w)
+    sy, ey = axis_slopes(values, at, n, j, v, n, n * n, u, 1, w)
+    sz, ez = axis_slopes(values, at, 1, k, w, n, n * n, u, n, v)
     # next to nothing of the exact slope is left, or the contrary: the differences straddle the limb
     if 10.0 * (sx * ex + sy * ey + sz * ez) < ex * ex + ey * ey + ez * ez:
         return ex * scale, ey * scale, ez * scale
     return sx * scale, sy * scale, sz * scale
+
+
+@helper
+def grid_gradient(grids: Grids, g: int, x: float, y: float, z: float) -> Triple:
+    """Gradient of grid g at grid coordinates, per FIGURE unit."""
+    return slopes_at(grids.values, grids.starts[g], grids.sizes[g], 1.0 / grids.spacings[g], x, y, z)
 
 
 @helper

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.compiled import sealed
-from fig2mesh.field.distance import lipschitz, negative_bounds
+from fig2mesh.field.distance import negative_bounds
 from fig2mesh.records import PartSdf
 
 
@@ -21,7 +21,6 @@ class Grids(NamedTuple):
     sizes : (G,) int64, nodes along an edge
     origins : (G, 3) float64, FIGURE, position of node (0, 0, 0)
     spacings : (G,) float64, FIGURE units
-    slopes : (G,) float64, Lipschitz bound of the grid's interpolant where it is positive, in its negative box
     boxes : (G, 2, 3) float64, FIGURE, box around the negative region, a little enlarged; (inf, -inf) if none
     owners : (G, 2) int64, the part a grid belongs to, twice; for a blend the two parts that it joins
     """
@@ -31,7 +30,6 @@ class Grids(NamedTuple):
     sizes: NDArray[np.int64]
     origins: NDArray[np.float64]
     spacings: NDArray[np.float64]
-    slopes: NDArray[np.float64]
     boxes: NDArray[np.float64]
     owners: NDArray[np.int64]
 
@@ -45,7 +43,7 @@ def pack(grids: Sequence[PartSdf], owners: Sequence[tuple[int, int]]) -> Grids:
     count = len(grids)
     sizes = np.array([grid.grid.shape[0] for grid in grids], np.int64).reshape(count)
     ends = np.cumsum(sizes**3)
-    origins, boxes, slopes = np.zeros((count, 3)), np.zeros((count, 2, 3)), np.zeros(count)
+    origins, boxes = np.zeros((count, 3)), np.zeros((count, 2, 3))
     for i, grid in enumerate(grids):
         # not grid.origin: in float32 it is off by up to 1e-7, which two grids of one field would show as a step
         origins[i] = grid.centre.astype(np.float64) - float(grid.edge) / 2
@@ -55,11 +53,6 @@ def pack(grids: Sequence[PartSdf], owners: Sequence[tuple[int, int]]) -> Grids:
             continue
         inside = np.clip([box[0] - _BOX_MARGIN, box[1] + _BOX_MARGIN], 0, sizes[i] - 1)
         boxes[i] = origins[i] + inside * grid.spacing
-        first = np.floor(inside[0]).astype(int)
-        last = np.minimum(np.floor(inside[1]).astype(int) + 2, sizes[i])
-        first = np.minimum(first, last - 2)
-        cells = tuple(slice(a, b) for a, b in zip(first, last, strict=True))
-        slopes[i] = lipschitz(grid.grid[cells], grid.spacing, outside=True)
     values = np.concatenate([grid.grid.ravel() for grid in grids]) if count else np.zeros(0, np.float32)
     fields: list[tuple[Any, Any]] = [
         (values, np.float32),
@@ -67,7 +60,6 @@ def pack(grids: Sequence[PartSdf], owners: Sequence[tuple[int, int]]) -> Grids:
         (sizes, np.int64),
         (origins, np.float64),
         ([grid.spacing for grid in grids], np.float64),
-        (slopes, np.float64),
         (boxes, np.float64),
         (np.reshape(np.array(owners, np.int64), (count, 2)), np.int64),
     ]

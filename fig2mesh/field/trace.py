@@ -22,9 +22,9 @@ def trace(body: Body, rays: Rays, *, tolerance: float = 1e-4, max_steps: int = 1
         matters only to those who want to bound the work
     with_normals : False leaves the normals zero, and costs nothing for them
 
-    Each part is marched only inside of the box around its negative region, nearest box first. A step is the value
-    divided by the grid's own Lipschitz bound; where that does not pass a cell, the interpolant is solved in the cell.
-    A field may therefore overestimate distances by any factor, which costs steps and no accuracy; see `trace_kernel`.
+    Each part is marched only inside of the box around its negative region, nearest box first. A step goes through cells
+    known to be empty, and in the others the interpolant is solved. Values beside the surface therefore do not matter: a
+    field may overestimate distances by any factor at no cost; see `empty_space` and `march_kernel`.
 
     A ray that starts inside meets the surface at once, at depth 0. A part that is still negative at a face of its cube
     ends there, as in `Body.distance`; normals there are the field's, not the face's. `Hits.steps` counts cells.
@@ -37,11 +37,13 @@ def trace(body: Body, rays: Rays, *, tolerance: float = 1e-4, max_steps: int = 1
     steps = np.zeros(count, np.int32)
     if not tolerance > 0:
         raise ValueError(f"tolerance: {tolerance}, expected a positive length")
+    grids, space = body.grids, body.empty_space
     origins, directions = sealed(rays.origins, np.float32), sealed(rays.directions, np.float32)
 
     def run(first: int, step: int) -> None:
         trace_blocks(
-            body.grids,
+            grids,
+            space,
             origins,
             directions,
             first,

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 FIGURE = Path(__file__).parents[2] / "examples" / "figures" / "farmer"
-TURNTABLE = tuple(range(0, 360, 30))
 
 
 def measure() -> dict[str, dict[str, Any]]:
@@ -61,54 +60,18 @@ def whole_figures(folder: Path) -> dict[str, dict[str, Any]]:
     }
 
 
-def farmer_body() -> Any:
-    """The body of the shipped farmer at standard quality."""
-    from fig2mesh.field.body import Body
-    from fig2mesh.parse.read import read_figure
-    from fig2mesh.pipeline import steps
-    from fig2mesh.settings import PRESETS
-
-    results: dict[str, Any] = {"figure": read_figure(FIGURE / "image.png", keypoints=FIGURE / "keypoints.json")}
-    for step in steps(PRESETS["standard"], 1.79)[:3]:
-        results[step.name] = step.run(*(results[name] for name in step.needs))
-    body = results["body"]
-    assert isinstance(body, Body)
-    return body
-
-
 def tracing() -> dict[str, dict[str, Any]]:
-    """Frames a second of a turntable with normals, and Embree on the isosurface of the same field beside it."""
-    import open3d as o3d
+    """Frames a second of a turntable with normals and colours, and Embree on the isosurface of the field beside it."""
+    from tests.benchmarks.frames import VIEWS, drawn, measure
 
-    from fig2mesh.field.camera import framing, orthographic
-    from fig2mesh.field.trace import trace
-    from fig2mesh.mesh.isosurface import isosurface
-
-    body = farmer_body()
-    mesh = isosurface(body, spacing=0.01)
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor.from_numpy(np.array(mesh.vertices)), o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32))
-    )
+    farmer = drawn("farmer")
     found = {}
-    ratio = 0.0
     for size in (256, 512):
-        frames = []
-        for yaw in TURNTABLE:
-            centre, height = framing(body.bounds(), (size, size), yaw)
-            frames.append(orthographic(yaw, size=(size, size), height=height, centre=centre))
-        packed = [np.concatenate([rays.origins, rays.directions], axis=1) for rays in frames]
-        trace(body, frames[0])
-        ours, theirs = [], []
-        for rays, both in zip(frames, packed, strict=True):
-            ours.append(_seconds(lambda rays=rays: trace(body, rays)))
-            theirs.append(_seconds(lambda both=both: scene.cast_rays(o3d.core.Tensor.from_numpy(both))))
-        fps = 1.0 / statistics.median(ours)
-        how = f"{size}x{size}, trilinear, normals, no texture blending, {len(TURNTABLE)} views of the farmer, median"
-        found[f"trace_fps_{size}"] = _value(fps, "1/s", how)
-        ratio = statistics.median(a / b for a, b in zip(ours, theirs, strict=True))
-    how = f"time per frame over Embree's on {len(mesh.faces)} triangles of the isosurface, 512x512, median of pairs"
-    return {**found, "embree_ratio_512": _value(ratio, "1", how)}
+        seconds = measure(farmer, size)
+        how = f"{size}x{size}, trilinear, normals, colours blended, {VIEWS} views of the farmer, median"
+        found[f"trace_fps_{size}"] = _value(1.0 / seconds["colour"], "1/s", how)
+    how = "time per coloured frame over Embree's on triangles of the isosurface, 512x512, median of pairs"
+    return {**found, "embree_ratio_512": _value(seconds["ratio"], "1", how)}
 
 
 def levels(folder: Path) -> dict[str, dict[str, Any]]:
