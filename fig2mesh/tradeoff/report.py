@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from fig2mesh.settings import PRESETS
 from fig2mesh.tradeoff.measures import Measured, knee, pareto
 from fig2mesh.tradeoff.sweep import KNOBS, STAGES_OF
 from fig2mesh.tradeoff.tolerance import Tolerance
@@ -18,6 +19,10 @@ COLUMNS: Final = (
     "figure", "knob", "value", "seconds", "stage_seconds", "peak_mb", "chamfer_mm", "hausdorff_mm", "normal_deg",
     "silhouette_iou", "front_ssim", "triangles", "failure",
 )  # fmt: skip
+
+
+CROWD: Final = 0.15
+"""Natural logarithm of the ratio of errors below which a run is close to the standard preset."""
 
 
 def rows(figure: str, found: Sequence[Measured]) -> list[dict[str, Any]]:
@@ -66,7 +71,7 @@ def summary(figure: str, found: Sequence[Measured], tolerances: Sequence[Toleran
         f"**The knee is `{_name(chosen)}`**: {chosen.run.total_s:.1f} s for {chosen.chamfer_mm:.2f} mm. "
         f"On the Pareto front, by rising time: {', '.join(f'`{name}`' for name in named)}.",
         f"![Error against seconds]({figure}-front.png)",
-        f"![Every knob]({figure}-knobs.png)",
+        *([f"![Every knob]({figure}-knobs.png)"] if any(m.run.knob in STAGES_OF for m in found) else []),
         "| setting | seconds | of its stage | peak MB | chamfer mm | Hausdorff mm | normals ° | IoU | front SSIM |",
         "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
     ]
@@ -87,14 +92,18 @@ def summary(figure: str, found: Sequence[Measured], tolerances: Sequence[Toleran
 
 
 def _front(found: Sequence[Measured]) -> tuple[list[int], int]:
-    costs, errors = [m.run.total_s for m in found], [m.chamfer_mm for m in found]
+    """Indices of the runs on the Pareto front, and which of them is the knee; models without colours are another
+    product, and the finest has no error by definition."""
+    rivals = [m.run.knob != "finest" and (m.run.knob, m.run.value) != ("textures", "none") for m in found]
+    costs = [m.run.total_s if rival else np.nan for m, rival in zip(found, rivals, strict=True)]
+    errors = [m.chamfer_mm for m in found]
     front = pareto(costs, errors).tolist()
     return front, knee([costs[i] for i in front], [errors[i] for i in front]) if front else 0
 
 
 def _name(measured: Measured) -> str:
     run = measured.run
-    return run.value if run.knob in ("", "quality") else f"{run.knob}={run.value}"
+    return run.value if run.knob in ("", "quality") else f"{run.knob}={run.value}" if run.value else run.knob
 
 
 def plot(found: Sequence[Measured], folder: Path, figure: str) -> None:
@@ -108,24 +117,34 @@ def plot(found: Sequence[Measured], folder: Path, figure: str) -> None:
 
 def _plot_front(found: Sequence[Measured], path: Path) -> None:
     from matplotlib.figure import Figure as Plot
+    from matplotlib.ticker import ScalarFormatter
 
     front, best = _front(found)
-    plot = Plot(figsize=(8, 5), layout="constrained")
+    standard = next(m for m in found if m.run.knob == "")
+    plot = Plot(figsize=(9, 5.5), layout="constrained")
     axes = plot.add_subplot()
-    known = [m for m in found if np.isfinite(m.chamfer_mm)]
-    presets = [m for m in known if m.run.knob in ("", "quality")]
     axes.plot([found[i].run.total_s for i in front], [found[i].chamfer_mm for i in front], color="0.75", zorder=1)
-    others = [m for m in known if m not in presets]
-    axes.scatter([m.run.total_s for m in others], [m.chamfer_mm for m in others], s=18, color="tab:blue", zorder=2)
-    axes.scatter([m.run.total_s for m in presets], [m.chamfer_mm for m in presets], s=60, color="tab:red", zorder=3)
-    for m in known:
-        weight = "bold" if m in presets or m is found[front[best]] else "normal"
-        axes.annotate(_name(m), (m.run.total_s, m.chamfer_mm), (4, 3), textcoords="offset points", fontsize=7,
-                      fontweight=weight)  # fmt: skip
+    for i, m in enumerate(found):
+        if not m.chamfer_mm > 0 or m.run.knob == "finest":
+            continue
+        preset = m.run.knob in ("", "quality")
+        axes.scatter(m.run.total_s, m.chamfer_mm, s=60 if preset else 18, color="tab:red" if preset else "tab:blue",
+                     zorder=2)  # fmt: skip
+        # What lies beside the standard preset would only hide it.
+        apart = abs(np.log(m.chamfer_mm / standard.chamfer_mm)) > CROWD
+        if preset or apart or i in front:
+            weight = "bold" if preset or i == front[best] else "normal"
+            axes.annotate(_name(m), (m.run.total_s, m.chamfer_mm), (5, 4), textcoords="offset points", fontsize=8,
+                          fontweight=weight)  # fmt: skip
     axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(ScalarFormatter())
+        axis.set_minor_formatter(ScalarFormatter())
+    axes.tick_params(labelsize="small", which="both")
     axes.set_xlabel("seconds, all stages")
     axes.set_ylabel("mean distance to the finest, mm")
-    axes.set_title("Presets red; the grey line is the Pareto front", fontsize="medium")
+    axes.set_title("Presets red, the Pareto front grey; unnamed: close to standard in error", fontsize="medium")
     plot.savefig(path, dpi=110)
 
 
@@ -133,20 +152,34 @@ def _plot_knobs(found: Sequence[Measured], path: Path) -> None:
     from matplotlib.figure import Figure as Plot
 
     knobs = [knob for knob in KNOBS if any(m.run.knob == knob for m in found) and knob != "quality"]
+    if not knobs:
+        return
     standard = next(m for m in found if m.run.knob == "")
-    plot = Plot(figsize=(3.1 * 4, 2.6 * -(-len(knobs) // 4)), layout="constrained")
+    plot = Plot(figsize=(13, 2.7 * -(-len(knobs) // 4)), layout="constrained")
     for index, knob in enumerate(knobs):
-        own = [m for m in found if m.run.knob == knob]
-        points = sorted([*own, standard], key=lambda m: m.run.total_s)
-        axes = plot.add_subplot(-(-len(knobs) // 4), 4, index + 1)
+        own = str(getattr(PRESETS["standard"], knob))
+        points = {m.run.value: m for m in found if m.run.knob == knob} | {own: standard}
+        names = sorted(points, key=_order)
         by_texture = knob in ("texture_size", "textures")
-        errors = [1 - m.run.front_ssim if by_texture else m.chamfer_mm for m in points]
-        axes.plot([m.run.total_s for m in points], errors, marker="o", markersize=4)
-        for m, error in zip(points, errors, strict=True):
-            label = m.run.value if m is not standard else "standard"
-            axes.annotate(label, (m.run.total_s, error), (3, 3), textcoords="offset points", fontsize=7)
-        axes.set_title(knob, fontsize="medium")
-        axes.set_xlabel("seconds", fontsize="x-small")
-        axes.set_ylabel("1 - front SSIM" if by_texture else "chamfer mm", fontsize="x-small")
-        axes.tick_params(labelsize="x-small")
+        errors = [1 - points[name].run.front_ssim if by_texture else points[name].chamfer_mm for name in names]
+        seconds = [points[name].run.seconds.get(STAGES_OF[knob], 0.0) for name in names]
+        axes = plot.add_subplot(-(-len(knobs) // 4), 4, index + 1)
+        axes.plot(names, errors, marker="o", markersize=4, color="tab:blue")
+        axes.set_ylim(bottom=0)
+        axes.set_title(f"{knob} (standard: {own})", fontsize="medium")
+        axes.set_ylabel("1 - front SSIM" if by_texture else "chamfer mm", fontsize="x-small", color="tab:blue")
+        beside = axes.twinx()
+        beside.plot(names, seconds, marker="s", markersize=4, color="tab:orange", linestyle="--")
+        beside.set_ylim(bottom=0)
+        beside.set_ylabel(f"seconds of {STAGES_OF[knob]}", fontsize="x-small", color="tab:orange")
+        for each in (axes, beside):
+            each.tick_params(labelsize="x-small")
     plot.savefig(path, dpi=110)
+
+
+def _order(value: str) -> tuple[float, str]:
+    """Numbers by size, coarse or small first as they come; words after them."""
+    try:
+        return float(value), ""
+    except ValueError:
+        return float("inf"), value

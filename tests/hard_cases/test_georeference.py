@@ -14,7 +14,7 @@ from exporters.asset import Asset
 from exporters.glb import write_glb
 from exporters.gltf_reader import read_gltf
 from exporters.tiles import write_tileset
-from fig2mesh.job import _placement
+from fig2mesh.job import placement_for
 from georef.geodesy import ecef_from_asset, ecef_from_geodetic, geodetic_from_ecef, tile_from_asset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import HEIGHT, asset
@@ -139,9 +139,9 @@ def test_vertices_at_the_scale_of_the_earth(
 )
 def test_places_that_are_hardly_there(lonlat: tuple[float, float], altitude: float, finding: str | None) -> None:
     if finding is None:
-        placed = _placement(lonlat, "N", 1.79, altitude, "ellipsoid")
+        placed = placement_for(lonlat, "N", 1.79, altitude, "ellipsoid")
         assert placed is not None
         assert (placed.lon_deg, placed.lat_deg, placed.height_m) == (*lonlat, altitude)
         return
     with pytest.raises(ValueError, match=finding):
-        _placement(lonlat, "N", 1.79, altitude, "ellipsoid")
+        placement_for(lonlat, "N", 1.79, altitude, "ellipsoid")
