@@ -45,4 +45,6 @@ def test_readme_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert {words[0] for words in commands} >= {"inspect", "validate", "doctor"}
     for words in commands:
         draft = [] if words[0] in ("inspect", "validate", "doctor") else ["--quality", "draft", "-q"]
+        # Small pictures; and a page that is written, not served until it is stopped.
+        draft += {"render": ["--size", "60", "80"], "view": ["-o", "page.html"]}.get(words[0], [])
         assert main([*words, *draft]) == 0, words
