@@ -78,10 +78,14 @@ def large(folder: Path, width: int, height: int, mode: str) -> tuple[Path, Path]
 
 
 def peak_mb(arguments: list[str]) -> float:
-    """Largest resident size of the main job in a process of its own, MiB."""
+    """Largest resident size of the main job in a process of its own, MiB.
+
+    Not what `getrusage` says: that starts at what the parent had when it forked, and a test run has grown by then.
+    """
     program = (
-        "import resource, sys\nfrom fig2mesh.cli import main\ncode = main(sys.argv[1:])\n"
-        "print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
+        "import re, sys\nfrom pathlib import Path\nfrom fig2mesh.cli import main\ncode = main(sys.argv[1:])\n"
+        "status = Path('/proc/self/status').read_text()\n"
+        "print(code, int(re.search(r'VmHWM:\\s*(\\d+)', status)[1]) / 1024)"
     )
     done = subprocess.run([sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=True)
     code, peak = done.stdout.split()
