@@ -14,12 +14,11 @@ from typing import Any
 import click
 
 from fig2mesh import __version__, render_cli, view_cli
+from fig2mesh.figure_options import FILE, figure_files, messages
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
 from fig2mesh.training import cli as training_cli
 from fig2mesh.training import data_cli
-
-FILE = click.Path(path_type=Path)
 
 
 class MainJobGroup(click.Group):
@@ -81,10 +80,7 @@ def cli() -> None:
     help=".glb .gltf .usda .usdc .usdz .ply .obj, or a folder / tileset.json for 3D Tiles; repeatable. "
     "Default: FIGURE's stem + .glb in the current folder.",
 )  # fmt: skip
-@click.option("--mask", type=FILE, metavar="PNG", help="Silhouette, bright on dark; default: the alpha channel.")
-@click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints.")
-@click.option("--part-labels", type=FILE, metavar="PNG", help="Part label of every pixel.")
-@click.option("--bbox", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Part of the picture that holds the figure.")
+@figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--triangles", type=click.IntRange(200, 2_000_000), metavar="N", help="Triangles of the finest mesh.")
 @click.option("--texture-size", type=click.IntRange(64, 8192), metavar="PX", help="Texels a side.")
@@ -121,8 +117,7 @@ def cli() -> None:
 @click.option("--resume-from", metavar="STAGE", help="Start at STAGE with what --save-stages DIR holds.")
 @click.option("--report", type=FILE, metavar="JSON", help="Seconds, memory, measures, versions, hashes.")
 @click.option("--overwrite", is_flag=True, help="Replace existing outputs.")
-@click.option("-q", "--quiet", is_flag=True, help="Only errors.")
-@click.option("-v", "--verbose", count=True, help="More messages; twice: tracebacks.")
+@messages
 def make(**options: Any) -> None:
     """Make a 3D model of FIGURE."""
     from fig2mesh.job import run

@@ -44,6 +44,10 @@ class Drawing:
     keypoints: Path
     mask: Path | None
 
+    def arguments(self) -> dict[str, Any]:
+        """Of `read_figure`."""
+        return {"path": self.image, "mask": self.mask, "keypoints": self.keypoints, "name": self.name}
+
 
 @dataclass(frozen=True)
 class Row:
@@ -102,10 +106,7 @@ def find_drawings(folder: Path) -> tuple[Drawing, ...]:
     found = []
     for path in sorted(folder.iterdir()):
         if path.is_dir() and (path / "image.png").exists():
-            mask = path / "mask.png"
-            found.append(
-                Drawing(path.name, path / "image.png", path / "keypoints.json", mask if mask.exists() else None)
-            )
+            found.append(drawing_in(path))
         elif path.suffix == ".png" and path.with_suffix(".json").exists():
             mask = path.with_name(f"{path.stem}_mask.png")
             found.append(Drawing(path.stem, path, path.with_suffix(".json"), mask if mask.exists() else None))
@@ -113,6 +114,12 @@ def find_drawings(folder: Path) -> tuple[Drawing, ...]:
         remedy = "give folders with image.png and keypoints.json, or pairs of NAME.png and NAME.json"
         raise InputError(folder, "no figures", remedy)
     return tuple(found)
+
+
+def drawing_in(folder: Path) -> Drawing:
+    """The figure that a folder of image.png, keypoints.json and, where needed, mask.png is."""
+    mask = folder / "mask.png"
+    return Drawing(folder.name, folder / "image.png", folder / "keypoints.json", mask if mask.exists() else None)
 
 
 def evaluate_figures(drawings: tuple[Drawing, ...], settings: Settings, say: Say = lambda line: None) -> list[Row]:
@@ -131,7 +138,7 @@ def evaluate_figures(drawings: tuple[Drawing, ...], settings: Settings, say: Say
 
 def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     """All measures of one drawing's model, by the keys of `COLUMNS`."""
-    figure = read_figure(drawing.image, mask=drawing.mask, keypoints=drawing.keypoints, name=drawing.name)
+    figure = read_figure(**drawing.arguments())
     settings = replace(settings, lods=LEVELS)
     figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}

@@ -81,7 +81,7 @@ def run(
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
-        check_report(report, overwrite)
+        check_text(report, overwrite)
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
     if lods > 1 and resume_from is None and not any(is_tileset(target) for target in targets):
         log.info("--lods %d: only 3D Tiles have levels of detail; one is made", lods)
@@ -264,25 +264,25 @@ def _part_names(levels: Any) -> dict[int, str]:
     return {int(label): PART_NAMES[label] for label in labels}
 
 
-def check_report(path: Path, overwrite: bool) -> None:
-    """Refuse a --report that could not be written."""
+def check_text(path: Path, overwrite: bool, option: str = "--report", another: str = "--report") -> None:
+    """Refuse a text file that could not be written; option, another : what its name is called in the remedy."""
     if path.is_dir():
-        raise OutputError(path, "is a folder", "give --report a file name")
+        raise OutputError(path, "is a folder", f"give {option} a file name")
     if path.exists() and not overwrite:
-        raise OutputError(path, "exists", "pass --overwrite or another --report")
+        raise OutputError(path, "exists", f"pass --overwrite or another {another}")
     if not path.parent.is_dir():
         raise OutputError(path, f"no folder {path.parent}", "create it first")
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a --report, whole or not at all."""
+def write_text(path: Path, text: str, another: str = "--report") -> None:
+    """Write a text file, whole or not at all; another : what its name is called in the remedy."""
     partial = path.with_name(f".{path.name}.partial")
     try:
         partial.write_text(text, encoding="utf-8")
         os.replace(partial, path)
     except OSError as error:
         partial.unlink(missing_ok=True)
-        raise OutputError(path, error.strerror or "cannot be written", "choose another --report") from None
+        raise OutputError(path, error.strerror or "cannot be written", f"choose another {another}") from None
 
 
 def peak_mb() -> float:

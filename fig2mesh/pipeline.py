@@ -6,7 +6,7 @@ a caller can time them, keep what they make and start in the middle.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -187,6 +187,24 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
 def _shading_normals(mesh: Mesh, body: Body) -> FloatArray:
     count("shading normals", len(mesh.vertices))
     return vertex_normals(mesh, body)
+
+
+def make_only(
+    goal: str, road: Sequence[Step], results: dict[str, Any], advance: Callable[[str], object] = lambda name: None
+) -> None:
+    """Run of `road` what the result `goal` needs and `results` lacks, in its order; `results` gets what is made.
+
+    advance : told the name of each step before it runs
+    """
+    wanted = {goal}
+    chosen = []
+    for step in reversed(road):
+        if step.name in wanted - results.keys():
+            chosen.append(step)
+            wanted |= set(step.needs)
+    for step in reversed(chosen):
+        advance(step.name)
+        results[step.name] = step.run(*(results[name] for name in step.needs))
 
 
 def _texels(settings: Settings, level: int) -> int:

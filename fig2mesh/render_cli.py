@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
+from fig2mesh.figure_options import FILE, figure_files, messages
 from fig2mesh.render.effects import EFFECTS, MODES
 
-FILE = click.Path(path_type=Path)
 EFFECT_HELP = "; ".join(f"{name}: {title}" for name, title in EFFECTS.items())
 
 
@@ -52,10 +51,7 @@ EFFECT_HELP = "; ".join(f"{name}: {title}" for name, title in EFFECTS.items())
 @click.option("--frames", type=click.IntRange(1), metavar="N", help="Pictures of a turn.  [default: 36]")
 @click.option("--fps", type=click.FloatRange(0.01, 100), metavar="N", help="Pictures a second.  [default: 12.5]")
 @click.option("--seconds", type=click.FloatRange(0.01, 10_000), metavar="S", help="Length of a turn.")
-@click.option("--mask", type=FILE, metavar="PNG", help="Silhouette, bright on dark; default: the alpha channel.")
-@click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints.")
-@click.option("--part-labels", type=FILE, metavar="PNG", help="Part label of every pixel.")
-@click.option("--bbox", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Part of the picture that holds the figure.")
+@figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True)
 @click.option("--textures", type=click.Choice(["network", "plain", "none"]), help="As in the main job.")
@@ -64,8 +60,7 @@ EFFECT_HELP = "; ".join(f"{name}: {title}" for name, title in EFFECTS.items())
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
 @click.option("--report", type=FILE, metavar="JSON", help="What was needed and counted: rays, normals, samples.")
 @click.option("--overwrite", is_flag=True, help="Replace existing outputs.")
-@click.option("-q", "--quiet", is_flag=True, help="Only errors.")
-@click.option("-v", "--verbose", count=True, help="More messages; twice: tracebacks.")
+@messages
 def render(**options: Any) -> None:
     """Make pictures of FIGURE, traced through its part fields, or of MODEL (.glb .gltf .ply .obj)."""
     from fig2mesh.render.job import run

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
 
-FILE = click.Path(path_type=Path)
+from fig2mesh.figure_options import FILE, figure_files, messages
 
 
 @click.command()
@@ -36,10 +35,7 @@ FILE = click.Path(path_type=Path)
     help="The npm package cesium; default: node_modules/cesium in this folder or one above. A page written with -o "
     "loads CesiumJS from the folder cesium beside it.",
 )  # fmt: skip
-@click.option("--mask", type=FILE, metavar="PNG", help="Silhouette, bright on dark; default: the alpha channel.")
-@click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints.")
-@click.option("--part-labels", type=FILE, metavar="PNG", help="Part label of every pixel.")
-@click.option("--bbox", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Part of the picture that holds the figure.")
+@figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True)
 @click.option("--textures", type=click.Choice(["network", "plain"]), help="As in the main job.")
@@ -49,8 +45,7 @@ FILE = click.Path(path_type=Path)
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free one", metavar="N")
 @click.option("--open/--no-open", "open_", default=True, help="Open the page in a browser.  [default: open]")
 @click.option("--overwrite", is_flag=True, help="Replace an existing page.")
-@click.option("-q", "--quiet", is_flag=True, help="Only errors.")
-@click.option("-v", "--verbose", count=True, help="More messages; twice: tracebacks.")
+@messages
 def view(**options: Any) -> None:
     """Look at FIGURE from all sides in a browser, which sphere-traces its part fields; Ctrl-C ends it."""
     from fig2mesh.view.job import run

@@ -13,7 +13,7 @@ from typing import Any
 from PIL import ImageColor
 
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.job import check_report, configure_logging, torch_device, write_text
+from fig2mesh.job import check_text, configure_logging, torch_device, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import ByteArray, Figure
 from fig2mesh.render.counts import Counts
@@ -100,7 +100,7 @@ def run(
         raise InputError("--size", f"{size[0]} {size[1]} with {samples} samples a side", "give less of either")
     check_pictures(output, overwrite, size, paper is None)
     if report is not None:
-        check_report(report, overwrite)
+        check_text(report, overwrite)
     if sun is not None and not sun.up:
         log.info("the sun is %.1f° below the horizon: only the sky's light is left", -sun.elevation_deg)
     request = Request(
@@ -147,21 +147,12 @@ def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldSc
     from fig2mesh.parse.frame import image_frame
     from fig2mesh.parts.pieces import clean
     from fig2mesh.parts.smooth_union import smooth_union
-    from fig2mesh.pipeline import Step, steps
+    from fig2mesh.pipeline import make_only, steps
 
     figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
     textures = needs(request.mode, request.effects).textures
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-    road = {step.name: step for step in steps(settings, 1.0)}
-
-    def make(step: Step) -> None:
-        for name in step.needs:
-            if name not in results:
-                make(road[name])
-        results[step.name] = step.run(*(results[name] for name in step.needs))
-
-    for goal in ("body", "textures") if textures else ("body",):
-        make(road[goal])
+    make_only("textures" if textures else "body", steps(settings, 1.0), results)
     body = results["body"]
     if "smooth-union" in request.effects:
         body = smooth_union(body, results["parts"].canvas)

@@ -6,11 +6,11 @@ import os
 import platform
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.evaluate_figures import Drawing, drawing_in
 from fig2mesh.field.body import Body
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
@@ -18,31 +18,16 @@ from fig2mesh.settings import PRESETS
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class Files:
-    """The files of one figure."""
-
-    name: str
-    image: Path
-    keypoints: Path
-    mask: Path | None
-
-    def arguments(self) -> dict[str, Any]:
-        """Of `read_figure`."""
-        return {"path": self.image, "keypoints": self.keypoints, "mask": self.mask, "name": self.name}
-
-
-def find_figures(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Files]:
+def find_figures(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Drawing]:
     """The files of folders with image.png, keypoints.json and perhaps mask.png, or of one picture."""
     if (keypoints or mask) and (len(figures) != 1 or figures[0].is_dir()):
         raise InputError("--keypoints", "given for several figures or a folder", "give one picture, or folders alone")
     found = []
     for figure in figures:
         if figure.is_dir():
-            own = figure / "mask.png"
-            files = Files(figure.name, figure / "image.png", figure / "keypoints.json", own if own.exists() else None)
+            files = drawing_in(figure)
         else:
-            files = Files(figure.stem, figure, keypoints or figure.with_name("keypoints.json"), mask)
+            files = Drawing(figure.stem, figure, keypoints or figure.with_name("keypoints.json"), mask)
         # Bad input is told before minutes of work.
         read_figure(**files.arguments())
         found.append(files)
@@ -52,7 +37,7 @@ def find_figures(figures: Sequence[Path], keypoints: Path | None, mask: Path | N
     return found
 
 
-def tradeoff(figures: Sequence[Files], folder: Path, knobs: Sequence[str], overwrite: bool, say: Say) -> None:
+def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], overwrite: bool, say: Say) -> None:
     """Sweep all figures; writes tradeoff.csv, README.md and two plots a figure into `folder`, all or nothing."""
     from fig2mesh.tradeoff.measures import measure
     from fig2mesh.tradeoff.report import as_csv, plot, rows, summary
@@ -97,14 +82,11 @@ def tradeoff(figures: Sequence[Files], folder: Path, knobs: Sequence[str], overw
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def _body(files: Files) -> Body:
-    from fig2mesh.pipeline import steps
+def _body(files: Drawing) -> Body:
+    from fig2mesh.pipeline import make_only, steps
 
     results: dict[str, Any] = {"figure": read_figure(**files.arguments())}
-    for step in steps(PRESETS["standard"], 1.79):
-        if step.name not in ("lift", "parts", "body"):
-            break
-        results[step.name] = step.run(*(results[name] for name in step.needs))
+    make_only("body", steps(PRESETS["standard"], 1.79), results)
     body = results["body"]
     assert isinstance(body, Body)
     return body

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import webbrowser
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import click
 
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.job import configure_logging, placement_for, progress, torch_device
+from fig2mesh.job import check_text, configure_logging, placement_for, progress, torch_device, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings, settings_for
@@ -21,9 +20,6 @@ from fig2mesh.view.scene import Scene, make_scene
 from fig2mesh.view.server import address_of, page_server
 
 log = logging.getLogger("fig2mesh")
-
-NEEDED = ("lift", "parts", "body", "textures")
-"""Stages of the pipeline that a page is made of: no mesh."""
 
 CESIUM = "cesium"
 """Where a page finds CesiumJS, relative to its own address."""
@@ -61,7 +57,9 @@ def run(
     placement = placement_for(lonlat, facing, height_m, altitude, altitude_datum)
     wanted = None if effects is None else _effects(effects)
     if output is not None:
-        _check_output(output, overwrite)
+        if output.suffix.lower() not in (".html", ".htm"):
+            raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
+        check_text(output, overwrite, "-o", "name")
     if cesium is not None and (placement is None or output is not None):
         raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
     folders = {CESIUM: find_cesium(cesium)} if placement is not None and output is None else {}
@@ -77,7 +75,7 @@ def run(
         advance("page")
         page = view_page(scene, wanted) if placement is None else globe_page(scene, placement, f"{CESIUM}/", wanted)
     if output is not None:
-        _write(output, page)
+        write_text(output, page, "name")
         log.info("%s: %.1f MB", output, len(page) / 1e6)
         return
     with page_server(page, port, folders) as shown:
@@ -99,14 +97,11 @@ def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any =
     """
     from fig2mesh.parse.frame import image_frame
     from fig2mesh.parts.pieces import clean
-    from fig2mesh.pipeline import steps
+    from fig2mesh.pipeline import make_only, steps
 
     figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-    for step in steps(settings, height_m):
-        if step.name in NEEDED:
-            advance(step.name)
-            results[step.name] = step.run(*(results[name] for name in step.needs))
+    make_only("textures", steps(settings, height_m), results, advance)
     lift, body, sources = results["lift"], results["body"], results["textures"]
     contours = settings.contours == "keep"
     return make_scene(figure.name, body, sources, image_frame(figure), lift, height_m, contours)
@@ -130,25 +125,3 @@ def _effects(text: str) -> tuple[str, ...]:
         if name not in EFFECTS:
             raise InputError("--effects", f"{name!r} is no effect", f"choose from {', '.join(EFFECTS)}")
     return tuple(names)
-
-
-def _check_output(path: Path, overwrite: bool) -> None:
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise OutputError(path, "is no name for a page", "give -o a name that ends in .html")
-    if path.is_dir():
-        raise OutputError(path, "is a folder", "give -o a file name")
-    if path.exists() and not overwrite:
-        raise OutputError(path, "exists", "pass --overwrite or another name")
-    if not path.parent.is_dir():
-        raise OutputError(path, f"no folder {path.parent}", "create it first")
-
-
-def _write(path: Path, text: str) -> None:
-    """Whole or not at all."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(path, error.strerror or "cannot be written", "choose another name") from None
