@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from georef.errors import PlacementError
 from georef.frames import ECEF, TILE
 from georef.geodesy import geodetic_from_ecef, nose_bearing_deg
 from georef.placement import GeoPlacement
@@ -23,7 +25,22 @@ def georeference(placement: GeoPlacement) -> dict[str, Any]:
         "height_datum": placement.height_datum,
         "heading_deg": placement.heading_deg,
         "figure_height_m": placement.figure_height_m,
+        "altitude_mode": placement.altitude_mode,
     }
+
+
+def placement_of_record(record: Mapping[str, Any]) -> GeoPlacement:
+    """The placement that `georeference` made a record of, as read back from a file.
+
+    Raises ValueError for a record of another kind or with values that no placement has.
+    """
+    if record.get("crs") != "EPSG:4979":
+        raise ValueError(f"georeference: crs is {record.get('crs')!r}, expected EPSG:4979")
+    fields = {name: value for name, value in record.items() if name != "crs"}
+    try:
+        return GeoPlacement(**fields)
+    except (TypeError, PlacementError) as error:
+        raise ValueError(f"georeference: {error}") from error
 
 
 def placement_of_tile(transform: ArrayLike) -> dict[str, float]:

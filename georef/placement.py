@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from georef.bearing import normalized_bearing
 from georef.errors import PlacementError
+
+AltitudeMode = Literal["absolute", "clamp"]
 
 
 def check_lonlat(lon_deg: float, lat_deg: float, source: str = "--lonlat") -> None:
@@ -33,6 +36,8 @@ class GeoPlacement:
     height_datum : what the height was given in before conversion: "ellipsoid", "egm96" or a grid's file name
     heading_deg : compass bearing the nose points to, degrees clockwise from north, in [0, 360)
     figure_height_m : height of the drawn figure, metres
+    altitude_mode : "absolute", the feet are at `height_m`; "clamp", they are `height_m` above whatever terrain the
+        client shows there, where the format knows such a thing (CZML)
     """
 
     lon_deg: float
@@ -41,6 +46,7 @@ class GeoPlacement:
     height_datum: str = "ellipsoid"
     heading_deg: float = 180.0
     figure_height_m: float = 1.79
+    altitude_mode: AltitudeMode = "absolute"
 
     def __post_init__(self) -> None:
         values = (self.lon_deg, self.lat_deg, self.height_m, self.heading_deg, self.figure_height_m)
@@ -49,4 +55,6 @@ class GeoPlacement:
         check_lonlat(self.lon_deg, self.lat_deg)
         if self.figure_height_m <= 0:
             raise PlacementError("--height-m", f"{self.figure_height_m:g} m", "give a positive height in metres")
+        if self.altitude_mode not in get_args(AltitudeMode):
+            raise PlacementError("--altitude-mode", f"{self.altitude_mode!r}", "give absolute or clamp")
         object.__setattr__(self, "heading_deg", normalized_bearing(self.heading_deg))
