@@ -1,4 +1,4 @@
-"""The 21 joints from a JSON file: `{"width", "height", "keypoints": {name: [x, y, visible]}}`."""
+"""The 21 joints from a file: `{"width", "height", "keypoints": {name: [x, y, visible]}}`, or an annotation tool's."""
 
 from __future__ import annotations
 
@@ -10,14 +10,23 @@ from typing import Any
 import numpy as np
 
 from fig2mesh.errors import FigureError
+from fig2mesh.parse.joint_formats import Box, NamedPoints, named_points
+from fig2mesh.parse.joint_names import completed
 from fig2mesh.records import JOINT_NAMES, BoolArray, FloatArray
 
 MAX_BYTES = 4 << 20
 """Larger files are no joint files; reading them whole would only cost memory."""
 
 
-def read_keypoints(path: Path) -> tuple[FloatArray, BoolArray, tuple[int, int] | None]:
-    """Read joints.
+def read_keypoints(
+    path: Path, picture: str = "", bbox: Box | None = None
+) -> tuple[FloatArray, BoolArray, tuple[int, int] | None]:
+    """Read joints: our own JSON, COCO, LabelMe or Supervisely, told apart by content.
+
+    Parameters
+    ----------
+    picture : file name of the drawing, for files about several pictures
+    bbox : x0, y0, x1, y1, IMAGE, round the figure, for files about several figures
 
     Returns
     -------
@@ -30,6 +39,9 @@ def read_keypoints(path: Path) -> tuple[FloatArray, BoolArray, tuple[int, int] |
     FigureError : the file cannot be read, or a joint is missing, misnamed or not a pair of finite numbers
     """
     content = _load(path)
+    named = named_points(content, path, picture, bbox)
+    if named is not None:
+        return _from_names(named, path)
     joints = content.get("keypoints") if isinstance(content, dict) else None
     if not isinstance(joints, dict):
         raise FigureError(path, 'no "keypoints" object', 'expected {"keypoints": {"head": [x, y, visible], ...}}')
@@ -54,6 +66,18 @@ def read_keypoints(path: Path) -> tuple[FloatArray, BoolArray, tuple[int, int] |
     if isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0:
         return points, visible, (width, height)
     return points, visible, None
+
+
+def _from_names(named: NamedPoints, path: Path) -> tuple[FloatArray, BoolArray, tuple[int, int] | None]:
+    guessed = completed(named.points)
+    points = named.points | guessed
+    missing = [name for name in JOINT_NAMES if name not in points]
+    if missing:
+        found = f"joints missing: {_listed(missing)}"
+        raise FigureError(path, found, f"add them; all 21 are: {', '.join(JOINT_NAMES)}")
+    joints = np.array([points[name] for name in JOINT_NAMES], np.float32)
+    visible = np.array([named.visible.get(name, False) for name in JOINT_NAMES], np.bool_)
+    return joints, visible, named.size
 
 
 def _load(path: Path) -> Any:

@@ -51,7 +51,7 @@ def read_figure(
     silhouette = _read_mask(mask, rgba, path)
     if keypoints is None:
         raise FigureError(path, "no joints given", "pass --keypoints JSON with the 21 joints")
-    joints, visible, drawn_on = read_keypoints(keypoints)
+    joints, visible, drawn_on = read_keypoints(keypoints, path.name, bbox)
     if drawn_on is not None and drawn_on != (width, height):
         raise FigureError(
             keypoints,
