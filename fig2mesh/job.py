@@ -174,6 +174,7 @@ def _stages(folder: Path, figure: Figure, settings: Settings, resume_from: str |
     digest = hashlib.sha256()
     for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
         digest.update(str(array.shape).encode() + array.tobytes())
+    digest.update(repr(sorted(figure.depth_order.items())).encode())
     request = {"figure": digest.hexdigest(), **asdict(settings)}
     if resume_from is None:
         clear_stages(folder)

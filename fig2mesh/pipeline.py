@@ -27,6 +27,7 @@ from fig2mesh.parts.network import part_inference
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.placing import asset_from_figure
 from fig2mesh.pose.network import lift_by_network
+from fig2mesh.pose.order import ordered
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh, PointCloud, Pose3D, UvMesh
 from fig2mesh.settings import Settings
@@ -60,7 +61,7 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
 
     def lift_pose(figure: Figure) -> Pose3D:
         road = lift if settings.parts == "outline" else lift_by_network
-        return road(figure, image_frame(figure))
+        return ordered(road(figure, image_frame(figure)), figure.depth_order)
 
     def infer_parts(figure: Figure, pose: Pose3D) -> Outline:
         canvas = make_canvas(figure, image_frame(figure), settings.canvas_px, settings.voxel)

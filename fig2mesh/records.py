@@ -5,8 +5,9 @@ Every array says its frame; the frames are defined in `georef.frames`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,12 @@ PART: dict[str, int] = {name: index for index, name in enumerate(PART_NAMES)}
 BODY_PARTS: range = range(1, 15)
 
 
+LIMBS = ("l_arm", "r_arm", "l_leg", "r_leg")
+
+DepthOrder = Literal["front", "behind"]
+"""Before the rest of the body as the viewer sees it, or behind it."""
+
+
 class _Checked:
     """Mixin: freeze and check array fields in `__post_init__`."""
 
@@ -56,6 +63,8 @@ class Figure(_Checked):
     joints_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
     visible : (21,) bool; False where a joint is hidden and its position a guess
     part_labels : (H, W) uint8, IMAGE, `PART_NAMES`; all 0 where the user gave none
+    depth_order : limbs (of `LIMBS`) of which the user says that they are before or behind the body; of the others the
+        pose tells
     """
 
     name: str
@@ -64,6 +73,7 @@ class Figure(_Checked):
     joints_px: FloatArray
     visible: BoolArray
     part_labels: ByteArray
+    depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._put("rgba", np.uint8, (None, None, 4))
@@ -72,6 +82,9 @@ class Figure(_Checked):
         self._put("joints_px", np.float32, (21, 2))
         self._put("visible", np.bool_, (21,))
         self._put("part_labels", np.uint8, (height, width))
+        for limb, order in self.depth_order.items():
+            if limb not in LIMBS or order not in get_args(DepthOrder):
+                raise ValueError(f"depth_order: {limb!r}: {order!r}, expected {LIMBS} to be front or behind")
 
 
 @dataclass(frozen=True)

@@ -4,35 +4,45 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_formats import Box, NamedPoints, named_points
 from fig2mesh.parse.joint_names import completed
-from fig2mesh.records import JOINT_NAMES, BoolArray, FloatArray
+from fig2mesh.records import JOINT_NAMES, LIMBS, BoolArray, DepthOrder, FloatArray
 
 MAX_BYTES = 4 << 20
 """Larger files are no joint files; reading them whole would only cost memory."""
 
 
-def read_keypoints(
-    path: Path, picture: str = "", bbox: Box | None = None
-) -> tuple[FloatArray, BoolArray, tuple[int, int] | None]:
+@dataclass(frozen=True)
+class Joints:
+    """What a joints file says.
+
+    points_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
+    visible : (21,) bool
+    size : (width, height) of the picture they were drawn on, None where the file does not say
+    depth_order : as in `fig2mesh.records.Figure`
+    """
+
+    points_px: FloatArray
+    visible: BoolArray
+    size: tuple[int, int] | None = None
+    depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
+
+
+def read_keypoints(path: Path, picture: str = "", bbox: Box | None = None) -> Joints:
     """Read joints: our own JSON, COCO, LabelMe or Supervisely, told apart by content.
 
     Parameters
     ----------
     picture : file name of the drawing, for files about several pictures
     bbox : x0, y0, x1, y1, IMAGE, round the figure, for files about several figures
-
-    Returns
-    -------
-    joints_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
-    visible : (21,) bool
-    size : (width, height) of the picture they were drawn on, or None where the file does not say
 
     Raises
     ------
@@ -63,12 +73,15 @@ def read_keypoints(
         points[index] = value[:2]
         visible[index] = len(value) == 2 or value[2] > 0
     width, height = content.get("width"), content.get("height")
-    if isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0:
-        return points, visible, (width, height)
-    return points, visible, None
+    sized = isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0
+    order = content.get("depth_order", {})
+    if not isinstance(order, dict) or any(k not in LIMBS or v not in get_args(DepthOrder) for k, v in order.items()):
+        found = f"depth_order is {json.dumps(order)[:60]}"
+        raise FigureError(path, found, f'give {{"l_arm": "front"}} or "behind", for {", ".join(LIMBS)}')
+    return Joints(points, visible, (width, height) if sized else None, order)
 
 
-def _from_names(named: NamedPoints, path: Path) -> tuple[FloatArray, BoolArray, tuple[int, int] | None]:
+def _from_names(named: NamedPoints, path: Path) -> Joints:
     guessed = completed(named.points)
     points = named.points | guessed
     missing = [name for name in JOINT_NAMES if name not in points]
@@ -77,7 +90,7 @@ def _from_names(named: NamedPoints, path: Path) -> tuple[FloatArray, BoolArray, 
         raise FigureError(path, found, f"add them; all 21 are: {', '.join(JOINT_NAMES)}")
     joints = np.array([points[name] for name in JOINT_NAMES], np.float32)
     visible = np.array([named.visible.get(name, False) for name in JOINT_NAMES], np.bool_)
-    return joints, visible, named.size
+    return Joints(joints, visible, named.size)
 
 
 def _load(path: Path) -> Any:

@@ -51,11 +51,12 @@ def read_figure(
     silhouette = _read_mask(mask, rgba, path)
     if keypoints is None:
         raise FigureError(path, "no joints given", "pass --keypoints JSON with the 21 joints")
-    joints, visible, drawn_on = read_keypoints(keypoints, path.name, bbox)
-    if drawn_on is not None and drawn_on != (width, height):
+    given = read_keypoints(keypoints, path.name, bbox)
+    joints = given.points_px
+    if given.size is not None and given.size != (width, height):
         raise FigureError(
             keypoints,
-            f"made for a picture of {drawn_on[0]}×{drawn_on[1]} px, but {path.name} has {width}×{height}",
+            f"made for a picture of {given.size[0]}×{given.size[1]} px, but {path.name} has {width}×{height}",
             "pass the joints that belong to this picture",
         )
     labels = np.zeros((height, width), np.uint8) if part_labels is None else _read_labels(part_labels, rgba)
@@ -82,8 +83,9 @@ def read_figure(
         rgba=rgba,
         mask=silhouette,
         joints_px=np.clip(joints, 0, [width, height]),
-        visible=visible,
+        visible=given.visible,
         part_labels=np.where(silhouette, labels, 0),
+        depth_order=given.depth_order,
     )
 
 

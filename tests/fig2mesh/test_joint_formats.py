@@ -44,10 +44,10 @@ def test_round_trip(kind: str, data: st.DataObject, tmp_path: Path) -> None:
     joints = np.array(values, np.float32).reshape(21, 2)
     visible = np.array(data.draw(st.lists(st.booleans(), min_size=21, max_size=21)))
     path = saved(tmp_path, WRITERS[kind](joints, visible, (9000, 9000), "figure.png"))
-    again, seen, size = read_keypoints(path, "figure.png")
-    assert np.abs(again - joints).max() <= 0.006  # hundredths, and float32 at 9000
-    assert np.array_equal(seen, visible)
-    assert size == (9000, 9000)
+    again = read_keypoints(path, "figure.png")
+    assert np.abs(again.points_px - joints).max() <= 0.006  # hundredths, and float32 at 9000
+    assert np.array_equal(again.visible, visible)
+    assert again.size == (9000, 9000)
 
 
 def test_every_bone_joins_two_joints_and_all_are_joined() -> None:
@@ -93,28 +93,28 @@ def coco_17(tmp_path: Path, figures: int = 1, **annotation: Any) -> Path:
 
 
 def test_joints_that_coco_lacks_follow_from_those_it_has_and_count_as_hidden(tmp_path: Path) -> None:
-    joints, visible, size = read_keypoints(coco_17(tmp_path), "figure.png")
-    assert size == (900, 300)
+    found = read_keypoints(coco_17(tmp_path), "figure.png")
+    assert found.size == (900, 300)
     height = DRAWN[:, 1].max() - DRAWN[:, 1].min()
-    assert np.linalg.norm(joints - DRAWN, axis=1).max() < 0.06 * height
-    assert not visible[[JOINT[name] for name in ("neck", "thorax", "pelvis", "l_hand", "r_foot")]].any()
-    assert visible[[JOINT[name] for name in ("l_wrist", "r_ankle")]].all()
+    assert np.linalg.norm(found.points_px - DRAWN, axis=1).max() < 0.06 * height
+    assert not found.visible[[JOINT[name] for name in ("neck", "thorax", "pelvis", "l_hand", "r_foot")]].any()
+    assert found.visible[[JOINT[name] for name in ("l_wrist", "r_ankle")]].all()
 
 
 def test_the_box_chooses_among_figures(tmp_path: Path) -> None:
     path = coco_17(tmp_path, figures=3)
     with pytest.raises(FigureError, match="3 figures; pass --bbox"):
         read_keypoints(path, "figure.png")
-    joints, _, _ = read_keypoints(path, "figure.png", (300, 0, 500, 300))
-    assert 300 < joints[JOINT["pelvis"], 0] < 500
+    chosen = read_keypoints(path, "figure.png", (300, 0, 500, 300))
+    assert 300 < chosen.points_px[JOINT["pelvis"], 0] < 500
 
 
 def test_tools_that_have_points_by_identifier(tmp_path: Path) -> None:
     nodes = {f"b1f0-{i}": {"loc": list(xy), "label": name} for i, (name, xy) in enumerate(JOINTS.items())}
     content = {"size": {"width": 200, "height": 300}, "objects": [{"geometryType": "graph", "nodes": nodes}]}
-    joints, visible, _ = read_keypoints(saved(tmp_path, content))
-    assert np.array_equal(joints, DRAWN)
-    assert visible.all()
+    found = read_keypoints(saved(tmp_path, content))
+    assert np.array_equal(found.points_px, DRAWN)
+    assert found.visible.all()
 
 
 def test_other_shapes_in_the_file_do_not_matter(tmp_path: Path) -> None:
@@ -123,9 +123,9 @@ def test_other_shapes_in_the_file_do_not_matter(tmp_path: Path) -> None:
         {"label": "river", "points": [[0, 0], [1, 1], [2, 0]], "shape_type": "polygon"},
         {"label": "church", "points": [[5, 5]], "shape_type": "point"},
     ]
-    joints, visible, _ = read_keypoints(saved(tmp_path, content))
-    assert np.array_equal(joints, DRAWN)
-    assert np.array_equal(visible, SEEN)
+    found = read_keypoints(saved(tmp_path, content))
+    assert np.array_equal(found.points_px, DRAWN)
+    assert np.array_equal(found.visible, SEEN)
 
 
 @pytest.mark.parametrize(

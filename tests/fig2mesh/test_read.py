@@ -152,3 +152,13 @@ def test_bad_bbox_is_named(files: DrawnFiles) -> None:
 def test_joint_names_are_the_papers() -> None:
     assert len(JOINT_NAMES) == 21
     assert len(set(JOINT_NAMES)) == 21
+
+
+def test_depth_order_comes_from_the_joints_file(files: DrawnFiles, tmp_path: Path) -> None:
+    content = keypoints() | {"depth_order": {"l_arm": "behind"}}
+    path = tmp_path / "ordered.json"
+    path.write_text(json.dumps(content))
+    assert read_figure(files.image, keypoints=path).depth_order == {"l_arm": "behind"}
+    path.write_text(json.dumps(content | {"depth_order": {"l_arm": "above"}}))
+    with pytest.raises(FigureError, match="depth_order is .* give"):
+        read_figure(files.image, keypoints=path)

@@ -1,0 +1,36 @@
+"""Limbs before or behind the body where the user says so: what one view cannot tell, a person who looks at it can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fig2mesh.records import JOINT, DepthOrder, Pose3D
+
+CHAINS = {"arm": ("shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", "ankle", "foot")}
+
+LEAST = {"elbow": 0.10, "wrist": 0.20, "hand": 0.22, "knee": 0.08, "ankle": 0.10, "foot": 0.10}
+"""How far from the root of the limb, in depth, its joints are at least, FIGURE units. Half a chest is 0.12 deep."""
+
+
+def ordered(pose: Pose3D, order: Mapping[str, DepthOrder]) -> Pose3D:
+    """The pose with the limbs of `order` brought before or behind the body.
+
+    order : limb (`fig2mesh.records.LIMBS`) → "front" or "behind"
+
+    Seen from the front a bone that leans towards the viewer looks like one that leans away by as much; each bone of the
+    limb gets the sign asked for, and where it hardly leans, enough depth to be clear of the body. x and y stay.
+    """
+    if not order:
+        return pose
+    joints = pose.joints.copy()
+    for limb, where in order.items():
+        side, kind = limb.split("_")
+        sign = 1.0 if where == "front" else -1.0
+        chain = [JOINT[f"{side}_{name}"] for name in CHAINS[kind]]
+        root = pose.joints[chain[0], 2]
+        leans = np.abs(np.diff(pose.joints[chain, 2]))
+        for joint, name, lean in zip(chain[1:], CHAINS[kind][1:], np.cumsum(leans), strict=True):
+            joints[joint, 2] = root + sign * max(float(lean), LEAST[name])
+    return Pose3D(joints)
