@@ -56,6 +56,8 @@ class Figure(_Checked):
     joints_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
     visible : (21,) bool; False where a joint is hidden and its position a guess
     part_labels : (H, W) uint8, IMAGE, `PART_NAMES`; all 0 where the user gave none
+    origin_px : (x, y) of its upper left corner in the picture that it was cut from, px of that picture
+    step_px : pixels of that picture to one of its own
     """
 
     name: str
@@ -64,6 +66,8 @@ class Figure(_Checked):
     joints_px: FloatArray
     visible: BoolArray
     part_labels: ByteArray
+    origin_px: tuple[float, float] = (0.0, 0.0)
+    step_px: float = 1.0
 
     def __post_init__(self) -> None:
         self._put("rgba", np.uint8, (None, None, 4))

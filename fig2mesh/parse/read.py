@@ -59,6 +59,7 @@ def read_figure(
             "pass the joints that belong to this picture",
         )
     labels = np.zeros((height, width), np.uint8) if part_labels is None else _read_labels(part_labels, rgba)
+    origin = (0.0, 0.0) if bbox is None else (float(bbox[0]), float(bbox[1]))
     if bbox is not None:
         x0, y0, x1, y1 = bbox
         if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
@@ -84,6 +85,7 @@ def read_figure(
         joints_px=np.clip(joints, 0, [width, height]),
         visible=visible,
         part_labels=np.where(silhouette, labels, 0),
+        origin_px=origin,
     )
 
 
