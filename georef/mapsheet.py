@@ -21,13 +21,17 @@ from georef.sheets.controls import Affine, Controls, FloatArray, on_picture
 from georef.sheets.find import OPTION, find_georeference
 from georef.sheets.fit import METHODS, Map, fit
 from georef.sheets.hull import convex_hull, nearest_in
-from georef.sheets.reference import Plane, crs_of, local_plane, plane_of
+from georef.sheets.reference import Plane, crs_of, fitting_plane, local_plane, plane_of
 
 TRANSFORMS = ("auto", *METHODS)
 
 COARSE = 0.03
 """Root mean square residual, as a share of the control points' extent, from which on the points seem not to belong to
 this picture or the reference system not to the sheet: pictorial maps are drawn freely, but not that freely."""
+
+
+INACCURATE_M = 1.0
+"""Accuracy of a datum transformation from which on it is told."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +133,7 @@ class MapSheet:
         matrix = np.stack([right, down], axis=1)
         scales = np.linalg.svd(matrix, compute_uv=False)
         if not np.isfinite(scales).all() or scales[1] <= 1e-9 * scales[0] or scales[1] == 0:
-            raise PlacementError(source, f"the map folds or ends at {x:g} {y:g}", "choose another --map-transform")
+            raise PlacementError(source, f"the map folds or ends at {x:g} {y:g}", "check the georeference of the sheet")
         mirrored = bool(np.linalg.det(matrix) > 0)
         notes = []
         if mirrored:
@@ -138,7 +142,7 @@ class MapSheet:
         if outside:
             notes.append(f"{self.file}: {x:g} {y:g} lies {_metres(outside)} outside the control points' hull")
         accuracy = self.plane.accuracy_m()
-        if accuracy is not None and accuracy > 1.0:
+        if accuracy is not None and accuracy > INACCURATE_M:
             notes.append(f"{self.crs}: known to {accuracy:g} m against WGS 84 without grids that are not at hand")
         up = _bearing(-down)
         return SheetPlace(
@@ -251,7 +255,7 @@ def _plane_for(
         return crs.name, plane, controls.coordinates
     lonlat = plane.to_lonlat(controls.coordinates)
     target = None if wanted is None else crs_of(wanted)
-    fitted = local_plane(lonlat) if target is None or target.is_geographic else plane_of(target)
+    fitted = local_plane(lonlat, controls.pixels) if target is None or target.is_geographic else fitting_plane(target)
     return crs.name, fitted, fitted.from_lonlat(lonlat)
 
 

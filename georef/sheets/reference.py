@@ -23,8 +23,8 @@ WIDE_DEG = 60.0
 """Control points further than this from their middle are those of a map of the world, for which no local plane is
 anywhere near the map's projection."""
 
-WORST_M = 1.0
-"""Accuracy of a datum transformation from which on it is told."""
+MAX_SEAMS = 24
+"""Gaps between longitudes that are tried as the seam of a map of the world."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +79,31 @@ def plane_of(crs: CRS, source: object = OPTION) -> Plane:
     return _plane(crs.name, transformer, crs.is_geographic, source)
 
 
-def local_plane(lonlat: FloatArray) -> Plane:
-    """A plane for control points in longitude and latitude.
+def fitting_plane(crs: CRS, source: object = OPTION) -> Plane:
+    """The plane of a reference system's projection, in which points given in longitude and latitude are fitted.
+
+    The datum is left out, there and back: it is only the shape of the projection that a fit needs, so that it can be
+    undone exactly, and old maps' projections are often named on a sphere that nothing ties to WGS 84.
+    """
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import CRSError, ProjError
+
+    try:
+        # Degrees from Greenwich on its ellipsoid: some systems count grads from Paris.
+        ellipsoid = crs.ellipsoid
+        radii = f"+a={ellipsoid.semi_major_metre!r} +b={ellipsoid.semi_minor_metre!r}"
+        transformer = Transformer.from_crs(crs, CRS.from_proj4(f"+proj=longlat {radii} +no_defs"), always_xy=True)
+    except (ProjError, CRSError, AttributeError):
+        raise PlacementError(source, f"{crs.name} cannot be computed", "give another projection") from None
+    return _plane(f"{crs.name}, its projection alone", transformer, False, source)
+
+
+def local_plane(lonlat: FloatArray, pixels: FloatArray) -> Plane:
+    """A plane for control points in longitude and latitude, (N, 2) each, degrees and IMAGE.
 
     A stereographic projection about their middle: conformal, so that a similarity of the sheet stays one, and without
     any special case at the poles and the antimeridian. For points that span more of the globe than `WIDE_DEG` to
-    each side, longitude and latitude themselves, counted from the middle.
+    each side, longitude and latitude themselves, with the seam where the pixels say that the map has it.
     """
     from pyproj import Transformer
 
@@ -96,7 +115,7 @@ def local_plane(lonlat: FloatArray) -> Plane:
     if length > 1e-3:
         farthest = float(np.degrees(np.arccos(np.clip(points @ middle / length, -1.0, 1.0)).max()))
     if farthest > WIDE_DEG:
-        return _plate(lonlat)
+        return _plate(lonlat, pixels)
     lon_0 = float(np.degrees(np.arctan2(middle[1], middle[0])))
     lat_0 = float(np.degrees(np.arcsin(np.clip(middle[2] / length, -1.0, 1.0))))
     transformer = Transformer.from_pipeline(
@@ -106,13 +125,18 @@ def local_plane(lonlat: FloatArray) -> Plane:
     return _plane(f"stereographic about {lon_0:.4f} {lat_0:.4f}", transformer, False, "control points", inverse=True)
 
 
-def _plate(lonlat: FloatArray) -> Plane:
-    # The meridian to count from is in the middle of what the points leave least free.
-    lon = np.sort(lonlat[:, 0])
-    gaps = np.diff(np.append(lon, lon[0] + 360.0))
-    widest = int(np.argmax(gaps))
-    middle = float(lon[widest] + gaps[widest] / 2 + 180.0)
-    middle = (middle + 180.0) % 360.0 - 180.0
+def _plate(lonlat: FloatArray, pixels: FloatArray) -> Plane:
+    # The seam is in one of the gaps between longitudes; in the right one they follow the pixels most evenly.
+    ordered = np.sort(lonlat[:, 0])
+    gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
+    basis = np.concatenate([pixels - pixels.mean(axis=0), np.ones((len(pixels), 1))], axis=1)
+    best, middle = np.inf, 0.0
+    for index in np.argsort(-gaps)[:MAX_SEAMS]:
+        opposite = float(ordered[index] + gaps[index] / 2 + 180.0)
+        turned = (lonlat[:, 0] - opposite + 180.0) % 360.0 - 180.0
+        missed = turned - basis @ np.linalg.lstsq(basis, turned, rcond=None)[0]
+        if (square := float(missed @ missed)) < best:
+            best, middle = square, (opposite + 180.0) % 360.0 - 180.0
 
     def to_lonlat(points: FloatArray) -> FloatArray:
         return _checked(np.stack([points[:, 0] + middle, points[:, 1]], axis=1), "control points")
