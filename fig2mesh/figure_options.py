@@ -66,9 +66,7 @@ def place_options(command: F) -> F:
             "--facing", default="viewer", metavar="N|NE|…|DEG|viewer", show_default=True,
             help="Compass bearing of the nose; viewer: towards the reader of the map, south without --map.",
         ),
-        click.option(
-            "--height-m", type=float, metavar="M", show_default=str(HEIGHT_M), help="Height of the figure.",
-        ),
+        click.option("--height-m", type=float, metavar="M", help=f"Height of the figure.  [default: {HEIGHT_M}]"),
         click.option(
             "--altitude", type=float, metavar="M", default=0.0, show_default=True, help="Height of the feet.",
         ),

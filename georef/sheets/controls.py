@@ -68,8 +68,7 @@ def make_controls(source: Path, rows: Any, **more: Any) -> Controls:
     if bad.any():
         finding = f"control point {int(np.argmax(bad)) + 1} is {table[bad][0].tolist()}"
         raise PlacementError(source, finding, "give finite numbers")
-    _, first = np.unique(table, axis=0, return_index=True)
-    table = table[np.sort(first)]
+    table = np.array(list(dict.fromkeys(map(tuple, table.tolist()))))
     return Controls(table[:, :2].copy(), table[:, 2:].copy(), **more)
 
 

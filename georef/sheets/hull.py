@@ -9,7 +9,7 @@ from georef.sheets.controls import FloatArray
 
 def convex_hull(points: FloatArray) -> FloatArray:
     """(M, 2) corners of the convex hull of (N, 2) points, in order. Andrew's monotone chain."""
-    ordered = np.unique(points, axis=0)
+    ordered = np.array(sorted(set(map(tuple, points.tolist()))))
 
     def half(chain: FloatArray) -> list[FloatArray]:
         corners: list[FloatArray] = []

@@ -104,7 +104,7 @@ def read(sheet: Sheet) -> Figure:
     return clean(figure, 0.02, 2048)[0]
 
 
-FAST = ["--quality", "draft", "--parts", "outline", "--mesher", "isosurface", "-q"]
+FAST = ["--quality", "draft", "--parts", "outline", "--textures", "none", "--mesher", "isosurface", "-q"]
 
 
 def run(arguments: Sequence[object]) -> int:
@@ -128,11 +128,10 @@ def test_the_whole_road(sheet: Sheet, read: Figure, tmp_path: Path) -> None:
     assert placed["heading_deg"] == pytest.approx(200.0, abs=1.5)
     # As large as drawn: its height in pixels, at 4 m each but for the grid's scale.
     drawn_px = float(np.ptp(np.flatnonzero(np.asarray(Image.open(sheet.mask)).max(axis=1) > 127)) + 1)
-    low, high = np.array(inspect(model)["bounds_m"]) if "bounds_m" in inspect(model) else (None, None)
     facts = json.loads(report.read_text())
     assert facts["placement"]["figure_height_m"] == pytest.approx(drawn_px * METRES_PX, rel=1e-3)
-    if low is not None:
-        assert high[1] - low[1] == pytest.approx(drawn_px * METRES_PX, rel=0.01)
+    # A hundredth of the height: the coarse mesh may stop short of the drawn tip.
+    assert inspect(model)["size_m"][1] == pytest.approx(drawn_px * METRES_PX, rel=0.01)
     said = facts["map"]
     assert (said["sheet"], said["georeference"], said["method"]) == ("map.png", "map.points", "affine")
     assert (said["control_points"], said["degrees_of_freedom"], said["inside_hull"]) == (7, 8, True)
