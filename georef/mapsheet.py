@@ -8,7 +8,6 @@ pixel up, down, left and right are on the ground: so the convergence of the meri
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from georef.sheets.controls import Affine, Controls, FloatArray, on_picture
 from georef.sheets.find import OPTION, find_georeference
 from georef.sheets.fit import METHODS, Map, fit
 from georef.sheets.hull import convex_hull, nearest_in
+from georef.sheets.quality import Quality, distances_m, quality_of
 from georef.sheets.reference import Plane, crs_of, fitting_plane, local_plane, plane_of
 
 TRANSFORMS = ("auto", *METHODS)
@@ -32,30 +32,6 @@ this picture or the reference system not to the sheet: pictorial maps are drawn 
 
 INACCURATE_M = 1.0
 """Accuracy of a datum transformation from which on it is told."""
-
-
-@dataclass(frozen=True)
-class Quality:
-    """How well a transformation agrees with its control points.
-
-    residuals_m : of each control point, on the ground, metres
-    rmse_m : root mean square of the residuals
-    degrees_of_freedom : coordinates that the points give more than the transformation needs; 0: it goes through
-        every point, and residuals say nothing
-    sigma_m : standard error of one coordinate, from the residuals and the degrees of freedom; None without any
-    left_out_m : what each control point is missed by, on the ground, when it is left out; only of splines
-    """
-
-    residuals_m: tuple[float, ...]
-    rmse_m: float
-    degrees_of_freedom: int
-    sigma_m: float | None
-    left_out_m: tuple[float, ...] = ()
-
-    @property
-    def left_out_rmse_m(self) -> float | None:
-        """Root mean square of `left_out_m`."""
-        return _rms(np.array(self.left_out_m)) if self.left_out_m else None
 
 
 @dataclass(frozen=True)
@@ -156,7 +132,7 @@ class MapSheet:
         nearest = nearest_in(convex_hull(self.pixels), pixel)
         if np.array_equal(nearest, pixel):
             return 0.0
-        return float(_distances(self.lonlat(nearest[None]), lonlat)[0])
+        return float(distances_m(self.lonlat(nearest[None]), lonlat)[0])
 
 
 def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = None) -> MapSheet:
@@ -181,9 +157,9 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     method = _method(controls, transform, found.file, notes)
     crs, plane, coordinates = _plane_for(controls, found.crs, map_crs, found.file, notes)
     fitted = fit(method, controls.pixels, coordinates, found.file)
+    quality = quality_of(fitted, plane, controls.pixels, coordinates)
     given = plane.to_lonlat(coordinates)
-    quality = _quality(given, plane, coordinates, fitted.apply(controls.pixels), fitted.parameters, fitted.left_out)
-    extent = float(_distances(given, np.broadcast_to(given[:1], given.shape)).max())
+    extent = float(distances_m(given, np.broadcast_to(given[:1], given.shape)).max())
     worst = max(quality.rmse_m, quality.left_out_rmse_m or 0.0)
     if worst > COARSE * extent:
         notes.append(
@@ -259,32 +235,6 @@ def _plane_for(
     return crs.name, fitted, fitted.from_lonlat(lonlat)
 
 
-def _quality(
-    given: FloatArray,
-    plane: Plane,
-    coordinates: FloatArray,
-    fitted: FloatArray,
-    parameters: int,
-    left_out: FloatArray | None,
-) -> Quality:
-    residuals = _distances(plane.to_lonlat(fitted), given)
-    free = max(2 * len(given) - parameters, 0)
-    sigma = math.sqrt(float((residuals**2).sum()) / free) if free else None
-    missed: tuple[float, ...] = ()
-    if left_out is not None:
-        # A spline made of too few points may put the one left out off the earth.
-        with suppress(PlacementError):
-            missed = tuple(_distances(plane.to_lonlat(coordinates - left_out), given).tolist())
-    return Quality(tuple(residuals.tolist()), _rms(residuals), free, sigma, missed)
-
-
-def _distances(one: FloatArray, other: FloatArray) -> FloatArray:
-    """(N,) lengths of geodesics on WGS 84, metres, between (N, 2) longitudes and latitudes."""
-    from pyproj import Geod
-
-    return np.asarray(Geod(ellps="WGS84").inv(one[:, 0], one[:, 1], other[:, 0], other[:, 1])[2], np.float64)
-
-
 def _on_ground(lonlat: FloatArray, lon: float, lat: float) -> FloatArray:
     """(N, 2) metres east and north of a place, in the plane that touches the ellipsoid there."""
     ecef = ecef_from_geodetic(np.concatenate([lonlat, np.zeros((len(lonlat), 1))], axis=1))
@@ -293,10 +243,6 @@ def _on_ground(lonlat: FloatArray, lon: float, lat: float) -> FloatArray:
 
 def _bearing(vector: FloatArray) -> float:
     return normalized_bearing(math.degrees(math.atan2(vector[0], vector[1])))
-
-
-def _rms(values: FloatArray) -> float:
-    return math.sqrt(float((values**2).mean()))
 
 
 def _metres(value: float) -> str:

@@ -44,6 +44,15 @@ def test_world_files_beside_a_picture(tmp_path: Path, name: str) -> None:
     assert at_home(tmp_path / name) == pytest.approx(expected(), abs=DEG)
 
 
+def test_gdal_reads_world_files_alike(tmp_path: Path) -> None:
+    sheet = picture(tmp_path / "map.png")
+    world_file(tmp_path / "map.pgw")
+    with rasterio.open(sheet) as file:
+        east, north = file.transform * PROBE.T
+    there = lonlat(np.stack([east, north], axis=1))
+    assert at_home(sheet, map_crs=SWISS) == pytest.approx(there, abs=DEG)
+
+
 def test_the_reference_system_may_be_an_option(tmp_path: Path) -> None:
     sheet = picture(tmp_path / "map.jpg")
     world_file(tmp_path / "map.jgw", comma=True)
