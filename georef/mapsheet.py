@@ -8,8 +8,10 @@ pixel up, down, left and right are on the ground: so the convergence of the meri
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,12 +25,18 @@ from georef.sheets.hull import convex_hull, nearest_in
 from georef.sheets.quality import Quality, distances_m, quality_of
 from georef.sheets.reference import Plane, crs_of, fitting_plane, local_plane, plane_of
 
+if TYPE_CHECKING:
+    from pyproj import CRS
+
 TRANSFORMS = ("auto", *METHODS)
 
 COARSE = 0.03
 """Root mean square residual, as a share of the control points' extent, from which on the points seem not to belong to
 this picture or the reference system not to the sheet: pictorial maps are drawn freely, but not that freely."""
 
+
+MOST_LON, MOST_LAT = 800.0, 100.0
+"""Larger numbers are no angles, in degrees or grads, whatever reference system a file names."""
 
 INACCURATE_M = 1.0
 """Accuracy of a datum transformation from which on it is told."""
@@ -185,7 +193,7 @@ def _given(
         finding = f"{file.name} gives the map itself, without control points"
         raise PlacementError(f"--map-transform {transform}", finding, "leave --map-transform away")
     notes: list[str] = []
-    crs = crs_of(*_chosen(named, map_crs, file, notes))
+    crs = _chosen(named, map_crs, file, notes)
     matrix = affine.matrix
     return MapSheet(
         file, picture, size, "given", crs.name, plane_of(crs, file),
@@ -194,16 +202,25 @@ def _given(
     )  # fmt: skip
 
 
-def _chosen(named: str | None, map_crs: str | None, file: Path, notes: list[str]) -> tuple[str, object]:
-    """The reference system to use, and who named it."""
-    if map_crs is not None:
-        if named is not None and crs_of(named, file) != crs_of(map_crs):
-            notes.append(f"{file}: names {crs_of(named, file).name}; --map-crs is used instead")
-        return map_crs, "--map-crs"
-    if named is None:
+def _chosen(named: str | None, map_crs: str | None, file: Path, notes: list[str]) -> CRS:
+    """The reference system of the coordinates: --map-crs, or what the files name."""
+    if map_crs is None and named is None:
         finding = "no reference system in it or beside it"
         raise PlacementError(f"{OPTION} {file}", finding, "pass --map-crs, such as EPSG:2056, or put a .prj beside it")
-    return named, file
+    if map_crs is None:
+        return crs_of(str(named), file)
+    crs = crs_of(map_crs)
+    own = _own(named, file)
+    if own is not None and own != crs:
+        notes.append(f"{file}: names {own.name}; --map-crs is used instead")
+    return crs
+
+
+def _own(named: str | None, file: Path) -> CRS | None:
+    """The reference system that the files name; None where they name none that is known."""
+    with suppress(PlacementError):
+        return None if named is None else crs_of(named, file)
+    return None
 
 
 def _method(controls: Controls, transform: str, file: Path, notes: list[str]) -> str:
@@ -220,17 +237,16 @@ def _plane_for(
     controls: Controls, named: str | None, map_crs: str | None, file: Path, notes: list[str]
 ) -> tuple[str, Plane, FloatArray]:
     """The name of the points' reference system, the plane to fit in, and the points in it."""
-    if named is not None and map_crs is not None and crs_of(named, file).is_geographic:
-        wanted: str | None = map_crs
-        crs = crs_of(named, file)
+    own = None if map_crs is None else _own(named, file)
+    if own is not None and own.is_geographic and (np.abs(controls.coordinates) <= (MOST_LON, MOST_LAT)).all():
+        crs, wanted, source = own, map_crs, "--map-crs"
     else:
-        text, source = _chosen(named, map_crs, file, notes)
-        wanted, crs = controls.plane, crs_of(text, source)
+        crs, wanted, source = _chosen(named, map_crs, file, notes), controls.plane, str(file)
     plane = plane_of(crs, file)
     if not plane.geographic:
         return crs.name, plane, controls.coordinates
     lonlat = plane.to_lonlat(controls.coordinates)
-    target = None if wanted is None else crs_of(wanted)
+    target = None if wanted is None else crs_of(wanted, source)
     fitted = local_plane(lonlat, controls.pixels) if target is None or target.is_geographic else fitting_plane(target)
     return crs.name, fitted, fitted.from_lonlat(lonlat)
 

@@ -152,8 +152,8 @@ def test_local_planes_are_undone_exactly(lon: float, lat: float, radius: float, 
     points = np.stack([lons, lats], axis=1)
     plane = local_plane(points, points)
     back = plane.to_lonlat(plane.from_lonlat(points))
-    # PROJ iterates to 1e-10 radians: half a millimetre at the worst.
-    assert np.abs(GEOD.inv(*back.T, *points.T)[2]).max() < 5e-4
+    # PROJ iterates latitudes to 1e-10 radians, 0.6 mm; within a kilometre of a pole that is what is left.
+    assert np.abs(GEOD.inv(*back.T, *points.T)[2]).max() < 2e-3
 
 
 def test_maps_of_the_world_are_fitted_in_degrees(folder: Path) -> None:

@@ -74,6 +74,22 @@ def test_another_system_than_the_file_names_is_told(tmp_path: Path) -> None:
     assert sheet.lonlat(PROBE) == pytest.approx(expected(), abs=DEG)
 
 
+def test_a_system_that_nobody_knows_can_be_overridden(tmp_path: Path) -> None:
+    picture(tmp_path / "map.png")
+    world_file(tmp_path / "map.pgw")
+    (tmp_path / "map.prj").write_text('PROJCS["Feuille 7"')
+    with pytest.raises(PlacementError, match="is no reference system"):
+        read_sheet(tmp_path / "map.png")
+    assert at_home(tmp_path / "map.png", map_crs=SWISS) == pytest.approx(expected(), abs=DEG)
+
+
+def test_metres_under_the_name_of_degrees_can_be_overridden(tmp_path: Path) -> None:
+    path = points_file(tmp_path / "map.points", controls(), swiss(controls()), "EPSG:4326")
+    with pytest.raises(PlacementError, match="lies outside the area of WGS 84"):
+        read_sheet(path)
+    assert at_home(path, map_crs=SWISS) == pytest.approx(expected(), abs=DEG)
+
+
 def write_geotiff(path: Path, transform: FloatArray | None = None, point: bool = False, **more: object) -> Path:
     """By GDAL. Its transforms are those of pixels' corners whatever the file says of its pixels."""
     if transform is not None:
