@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from fig2mesh import __version__, render_cli, view_cli
-from fig2mesh.figure_options import FILE, figure_files, messages
+from fig2mesh.figure_options import FILE, figure_files, messages, place_options
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
 from fig2mesh.training import cli as training_cli
@@ -64,16 +64,10 @@ def cli() -> None:
 
 @cli.command("make", hidden=True)
 @click.argument("figure", type=FILE)
-@click.option("--lonlat", type=float, nargs=2, metavar="LON LAT", help="Place on WGS 84, degrees.")
+@place_options
 @click.option(
-    "--facing", default="viewer", metavar="N|NE|…|DEG|viewer", show_default=True,
-    help="Compass bearing of the nose; viewer: towards the reader of a north-up map (south).",
-)  # fmt: skip
-@click.option("--height-m", type=float, metavar="M", default=1.79, show_default=True, help="Height of the figure.")
-@click.option("--altitude", type=float, metavar="M", default=0.0, show_default=True, help="Height of the feet.")
-@click.option(
-    "--altitude-datum", default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", show_default=True,
-    help="What --altitude is measured from.",
+    "--altitude-mode", type=click.Choice(["absolute", "clamp"]), default="absolute", show_default=True,
+    help="clamp: --altitude is above the terrain that a client shows, where the format can say so (CZML).",
 )  # fmt: skip
 @click.option(
     "-o", "--output", "outputs", multiple=True, metavar="OUT",

@@ -19,13 +19,11 @@ from exporters.write import check_outputs, is_tileset, write
 from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
+from fig2mesh.place import Placed, PlaceRequest, clamp_note, open_map, place
 from fig2mesh.plan import COLOURING, Plan, plan
 from fig2mesh.records import Figure
 from fig2mesh.report import Timing, make_report
 from fig2mesh.settings import FIRST_USE, STAGES, Settings, settings_for
-from georef.bearing import parse_facing
-from georef.heights import ellipsoidal_height
-from georef.placement import GeoPlacement
 
 log = logging.getLogger("fig2mesh")
 
@@ -36,11 +34,6 @@ REQUEST = "request"
 def run(
     *,
     figure: Path,
-    lonlat: tuple[float, float] | None,
-    facing: str,
-    height_m: float,
-    altitude: float,
-    altitude_datum: str,
     outputs: tuple[str, ...],
     mask: Path | None,
     keypoints: Path | None,
@@ -67,17 +60,24 @@ def run(
     overwrite: bool,
     quiet: bool,
     verbose: int,
+    **where: Any,
 ) -> None:
-    """What `fig2mesh FIGURE …` does; the parameters are the options of the command line."""
+    """What `fig2mesh FIGURE …` does; the parameters are the options of the command line.
+
+    where : the fields of `PlaceRequest`
+    """
     configure_logging(quiet, verbose)
-    placement = placement_for(lonlat, facing, height_m, altitude, altitude_datum)
+    start = time.perf_counter()
+    request = PlaceRequest(**where)
+    sheet = open_map(request)
+    placing_s = time.perf_counter() - start
     targets = outputs or (figure.stem + ".glb",)
     # Everything that can be refused is refused before the work begins.
     if resume_from is not None and resume_from not in STAGES:
         raise InputError("--resume-from", f"{resume_from} is no stage", f"choose from {', '.join(STAGES)}")
     if resume_from is not None and save_stages is None:
         raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
-    _check_targets(targets, figure.stem, lods, placement, overwrite)
+    _check_targets(targets, figure.stem, lods, request.somewhere, overwrite)
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
@@ -90,19 +90,26 @@ def run(
         quality=quality, triangles=triangles, texture_size=texture_size, lods=lods, parts=parts, textures=textures,
         contours=contours, effects=effects, mesher=mesher, closing=closing, device=torch_device(device), seed=seed,
     )  # fmt: skip
-    stages = None if save_stages is None else _stages(save_stages, drawn, settings, resume_from)
-
     from fig2mesh.parts.pieces import clean
 
+    whole = drawn
     drawn, pieces, specks = clean(drawn, settings.voxel, 2 * max(settings.texture_size, 1024))
+    start = time.perf_counter()
+    placed = place(request, sheet, drawn, figure)
+    timings: list[Timing] = []
+    if request.somewhere:
+        placing_s += time.perf_counter() - start
+        timings.append(Timing("place", placing_s, peak_mb(), "at --map" if sheet is not None else "at --lonlat"))
+    tell(placed, clamp_note(request, targets))
+    stages = None if save_stages is None else _stages(save_stages, whole, settings, resume_from)
+    del whole  # four bytes a pixel of what may be a whole sheet
     if specks:
         log.warning("%s: %d specks of the silhouette are too small to model and were left out", figure, specks)
     results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
-    timings: list[Timing] = []
     written: list[Path] = []
     planned = plan(settings, targets)
     with progress(quiet) as advance, counting() as counts:
-        _run_steps(settings, height_m, results, timings, stages, resume_from, advance, planned)
+        _run_steps(settings, placed.height_m, results, timings, stages, resume_from, advance, planned)
         found = results["solid"].how
         if found.components != pieces:
             log.warning("%s: %d solids for %d drawn pieces; %s", figure, found.components, pieces, found.note)
@@ -112,11 +119,11 @@ def run(
         asset = Asset(
             name=drawn.name,
             lods=levels,
-            placement=placement,
+            placement=placed.placement,
             part_names=_part_names(levels) if evidence else {},
             copyright=credit,
             lit=settings.light,
-            metadata={"source": figure.name, "seed": settings.seed, "quality": quality},
+            metadata={"source": figure.name, "seed": settings.seed, "quality": quality, **placed.metadata},
         )
         for target in targets:
             advance(f"write {target}")
@@ -125,7 +132,8 @@ def run(
             timings.append(Timing(f"write {target}", time.perf_counter() - start, peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
-        facts = make_report(inputs, written, asset, results, settings, height_m)
+        facts = make_report(inputs, written, asset, results, settings, placed.height_m)
+        facts["map"] = placed.map
         facts["stages"] = [timing.as_dict() for timing in timings]
         facts["effects"] = [{"effect": each.name, "run": each.runs, "why": each.why} for each in planned.effects]
         facts["counters"] = counts
@@ -195,32 +203,19 @@ def _stages(folder: Path, figure: Figure, settings: Settings, resume_from: str |
     return folder
 
 
-def placement_for(
-    lonlat: tuple[float, float] | None, facing: str, height_m: float, altitude: float, datum: str
-) -> GeoPlacement | None:
-    """The place that the options name; None without --lonlat."""
-    heading = parse_facing(facing)
-    if not 0.001 <= height_m <= 1e6:
-        raise InputError("--height-m", f"{height_m:g} m", "give a height between 1 mm and 1000 km")
-    if lonlat is None:
-        if altitude or datum != "ellipsoid":
-            raise InputError("--altitude", "given without a place", "pass --lonlat LON LAT as well")
-        return None
-    lon, lat = lonlat
-    if not -12_000 <= altitude <= 1e7:
-        raise InputError("--altitude", f"{altitude:g} m", "give metres above the datum, at most 10,000 km")
-    place = GeoPlacement(lon, lat, altitude, datum, heading, height_m)
-    height = ellipsoidal_height(lon, lat, altitude, datum)
-    name = datum if datum in ("ellipsoid", "egm96") else Path(datum).name
-    return GeoPlacement(place.lon_deg, place.lat_deg, height, name, heading, height_m)
+def tell(placed: Placed, *more: str | None) -> None:
+    """Log what the user is to know of a place."""
+    if placed.summary:
+        log.info("%s", placed.summary)
+    for note in (*placed.notes, *more):
+        if note:
+            log.warning("%s", note)
 
 
-def _check_targets(
-    targets: tuple[str, ...], name: str, lods: int, placement: GeoPlacement | None, overwrite: bool
-) -> None:
+def _check_targets(targets: tuple[str, ...], name: str, lods: int, somewhere: bool, overwrite: bool) -> None:
     for target in targets:
-        if placement is None and is_tileset(target):
-            raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT")
+        if not somewhere and is_tileset(target):
+            raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT or --map SHEET")
     check_outputs(targets, overwrite=overwrite, name=name, lods=lods)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.paper import FIGURE_HEIGHT
-from fig2mesh.parse.frame import ImageFrame
-from fig2mesh.records import JOINT, FloatArray, Pose3D
+from fig2mesh.parse.frame import ImageFrame, image_frame
+from fig2mesh.records import JOINT, Figure, FloatArray, Pose3D
 from georef.frames import ASSET, FIGURE
 from georef.transform import Transform
 
@@ -24,18 +24,38 @@ def asset_from_figure(pose: Pose3D, vertices: FloatArray, height_m: float) -> Tr
     height_m : height of the drawn figure, metres
     """
     scale = height_m / FIGURE_HEIGHT
-    feet = np.stack([_foot(pose, side) for side in "lr"])
-    standing = feet[:, 1] <= feet[:, 1].min() + STANDING * FIGURE_HEIGHT
-    x, _, z = feet[standing].mean(axis=0)
+    x, _, z = _stand(pose.joints)
     ground = float(vertices[:, 1].min())
     matrix = np.diag([scale, scale, scale, 1.0])
     matrix[:3, 3] = -scale * np.array([x, ground, z])
     return Transform(ASSET, FIGURE, matrix)
 
 
-def _foot(pose: Pose3D, side: str) -> NDArray[np.float64]:
-    ankle, foot = (pose.joints[JOINT[f"{side}_{joint}"]].astype(np.float64) for joint in ("ankle", "foot"))
-    return np.asarray((ankle + foot) / 2)
+def _stand(joints: FloatArray) -> NDArray[np.float64]:
+    """(D,) the middle of the standing feet of (21, D) FIGURE joints."""
+    feet = [[joints[JOINT[f"{side}_{joint}"]] for joint in ("ankle", "foot")] for side in "lr"]
+    middles = np.array(feet, np.float64).mean(axis=1)
+    standing = middles[:, 1] <= middles[:, 1].min() + STANDING * FIGURE_HEIGHT
+    return np.asarray(middles[standing].mean(axis=0))
+
+
+def foot_on_picture(figure: Figure) -> tuple[float, float]:
+    """The pixel (x, y) between the standing feet, at the lowest row of the drawing, of the picture that the figure was
+    cut from.
+
+    It is the one under the ASSET origin, as far as that is known before there is a surface: the mesh, of finite
+    triangles, may end a fraction of a pixel higher.
+    """
+    frame = image_frame(figure)
+    stand = frame.image_from_figure(_stand(frame.figure_from_image(figure.joints_px).astype(np.float32)))
+    bottom = float(np.flatnonzero(figure.mask.any(axis=1))[-1] + 1)
+    x0, y0 = figure.origin_px
+    return x0 + figure.step_px * float(stand[0]), y0 + figure.step_px * bottom
+
+
+def height_on_picture(figure: Figure) -> float:
+    """What is a figure's height on the globe, in pixels of the picture that it was cut from."""
+    return figure.step_px * FIGURE_HEIGHT / image_frame(figure).units_per_px
 
 
 def on_drawing(frame: ImageFrame, asset: Transform) -> tuple[float, tuple[float, float]]:

@@ -65,6 +65,8 @@ class Figure(_Checked):
     part_labels : (H, W) uint8, IMAGE, `PART_NAMES`; all 0 where the user gave none
     depth_order : limbs (of `LIMBS`) of which the user says that they are before or behind the body; of the others the
         pose tells
+    origin_px : (x, y) of its upper left corner in the picture that it was cut from, px of that picture
+    step_px : pixels of that picture to one of its own
     """
 
     name: str
@@ -74,6 +76,8 @@ class Figure(_Checked):
     visible: BoolArray
     part_labels: ByteArray
     depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
+    origin_px: tuple[float, float] = (0.0, 0.0)
+    step_px: float = 1.0
 
     def __post_init__(self) -> None:
         self._put("rgba", np.uint8, (None, None, 4))

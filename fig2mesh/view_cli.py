@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from fig2mesh.figure_options import FILE, figure_files, messages
+from fig2mesh.figure_options import FILE, figure_files, messages, place_options
 
 
 @click.command()
@@ -19,17 +19,7 @@ from fig2mesh.figure_options import FILE, figure_files, messages
     help="What is on at first: texture, blend, creases, light, ao, outline, smooth-union, perspective, antialias. "
     "Default: all but perspective, and outline only where the drawing's own is not there.",
 )  # fmt: skip
-@click.option("--lonlat", type=float, nargs=2, metavar="LON LAT", help="Show it there on a globe; needs CesiumJS.")
-@click.option(
-    "--facing", default="viewer", metavar="N|NE|…|DEG|viewer", show_default=True,
-    help="Compass bearing of the nose; viewer: south.",
-)  # fmt: skip
-@click.option("--height-m", type=float, metavar="M", default=1.79, show_default=True, help="Height of the figure.")
-@click.option("--altitude", type=float, metavar="M", default=0.0, show_default=True, help="Height of the feet.")
-@click.option(
-    "--altitude-datum", default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", show_default=True,
-    help="What --altitude is measured from.",
-)  # fmt: skip
+@place_options
 @click.option(
     "--cesium", type=FILE, metavar="DIR",
     help="The npm package cesium; default: node_modules/cesium in this folder or one above. A page written with -o "
@@ -47,7 +37,10 @@ from fig2mesh.figure_options import FILE, figure_files, messages
 @click.option("--overwrite", is_flag=True, help="Replace an existing page.")
 @messages
 def view(**options: Any) -> None:
-    """Look at FIGURE from all sides in a browser, which sphere-traces its part fields; Ctrl-C ends it."""
+    """Look at FIGURE from all sides in a browser, which sphere-traces its part fields; Ctrl-C ends it.
+
+    With a place, --lonlat or --map, it stands there on a globe; that needs CesiumJS.
+    """
     from fig2mesh.view.job import run
 
     run(**options)

@@ -30,11 +30,12 @@ def normalized_bearing(bearing_deg: float) -> float:
     return 0.0 if wrapped == 360.0 else wrapped + 0.0
 
 
-def parse_facing(text: str, source: str = "--facing") -> float:
+def parse_facing(text: str, source: str = "--facing", viewer_deg: float = VIEWER_BEARING_DEG) -> float:
     """The compass bearing that a facing names.
 
     text : one of `COMPASS_POINTS` in any case, a number of degrees clockwise from north, or "viewer"
     source : where the text comes from, for the error message
+    viewer_deg : the bearing towards the reader of the map; default: of one with north at the top
     returns : degrees clockwise from north in [0, 360)
 
     Raises PlacementError for anything else.
@@ -44,7 +45,7 @@ def parse_facing(text: str, source: str = "--facing") -> float:
     """
     word = text.strip()
     if word.lower() == "viewer":
-        return VIEWER_BEARING_DEG
+        return viewer_deg
     if word.upper() in COMPASS_POINTS:
         return COMPASS_POINTS.index(word.upper()) * 22.5
     if _NUMBER.fullmatch(word) and math.isfinite(float(word)):

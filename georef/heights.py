@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import functools
 import math
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,40 +21,13 @@ if TYPE_CHECKING:
 
 OPTION = "--altitude-datum"
 
-EGM96_GRIDS = ("us_nga_egm96_15.tif", "egm96_15.gtx")
-"""File names of the 15' EGM96 grid: https://cdn.proj.org and its older form."""
+EGM96_GRID = Path(__file__).parent / "data" / "egm96_15.tif"
+"""The 15' grid of EGM96 that the package brings, in whole millimetres; georef/data/README.md says where it is from."""
 
 GRID_SUFFIXES = (".gtx", ".tif", ".tiff")
 
 MAX_UNDULATION_M = 200.0
 """No geoid or levelling datum is further from the ellipsoid (EGM96: -107 m to 86 m); a terrain model soon is."""
-
-
-def _data_folders() -> list[Path]:
-    from pyproj import datadir
-
-    # The folders of the environment come last: they are often those of another PROJ, but a grid is a grid.
-    joined = os.pathsep.join(
-        [
-            datadir.get_data_dir(),
-            datadir.get_user_data_dir(),
-            os.environ.get("PROJ_DATA", ""),
-            os.environ.get("PROJ_LIB", ""),
-        ]
-    )
-    return [Path(folder) for folder in dict.fromkeys(joined.split(os.pathsep)) if folder]
-
-
-def _egm96_grid() -> Path:
-    for folder in _data_folders():
-        for name in EGM96_GRIDS:
-            if (folder / name).is_file():
-                return folder / name
-    raise PlacementError(
-        f"{OPTION} egm96",
-        f"the EGM96 grid {EGM96_GRIDS[0]} (or {EGM96_GRIDS[1]}) is not in PROJ's data folders",
-        f"pass the grid file itself, {OPTION} GRIDFILE, or fetch it with: projsync --file {EGM96_GRIDS[0]}",
-    )
 
 
 def grid_path(datum: str | Path) -> Path | None:
@@ -68,10 +40,11 @@ def grid_path(datum: str | Path) -> Path | None:
     word = str(datum).strip()
     if word.lower() == "ellipsoid":
         return None
-    if word.lower() == "egm96":
-        return _egm96_grid().resolve()
-    path = Path(datum)
+    egm96 = word.lower() == "egm96"
+    path = EGM96_GRID if egm96 else Path(datum)
     if not path.is_file():
+        if egm96:
+            raise PlacementError(f"{OPTION} egm96", f"{path} is missing", "install fig2mesh again, or pass a GRIDFILE")
         raise PlacementError(
             f"{OPTION} {datum}", "no such file", "give ellipsoid, egm96 or the path of a .gtx or .tif geoid grid"
         )
@@ -84,7 +57,9 @@ def grid_path(datum: str | Path) -> Path | None:
     path = path.resolve()
     if any(character in str(path) for character in ',"'):
         raise PlacementError(
-            f"{OPTION} {datum}", "PROJ cannot read paths with a comma or a quotation mark", "rename or move the file"
+            f"{OPTION} {datum}",
+            f"PROJ cannot read paths with a comma or a quotation mark ({path})",
+            "rename or move the file",
         )
     return path
 

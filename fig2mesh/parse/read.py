@@ -118,6 +118,7 @@ def read_figure(
         visible=given.visible,
         part_labels=np.where(silhouette, labels, 0),
         depth_order=given.depth_order,
+        origin_px=(float(view.corner[0]), float(view.corner[1])),
     )
 
 

@@ -50,7 +50,11 @@ def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]
         rgba, mask, labels = _reduced(rgba, factor), _reduced_mask(mask, factor), _reduced_labels(labels, factor)
         joints = np.minimum(joints / factor, np.array(mask.shape[::-1], np.float32))
         labels = np.where(mask, labels, 0)
-    cut = replace(figure, rgba=rgba, mask=mask, joints_px=joints, part_labels=labels)
+    corner = (figure.origin_px[0] + figure.step_px * x0, figure.origin_px[1] + figure.step_px * y0)
+    cut = replace(
+        figure, rgba=rgba, mask=mask, joints_px=joints, part_labels=labels,
+        origin_px=corner, step_px=figure.step_px * max(factor, 1),
+    )  # fmt: skip
     return cut, int(kept.sum()), int((~kept).sum())
 
 

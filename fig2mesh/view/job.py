@@ -10,8 +10,9 @@ from typing import Any
 import click
 
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.job import check_text, configure_logging, placement_for, progress, torch_device, write_text
+from fig2mesh.job import check_text, configure_logging, progress, tell, torch_device, write_text
 from fig2mesh.parse.read import read_figure
+from fig2mesh.place import PlaceRequest, open_map, place
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings, settings_for
 from fig2mesh.view.globe import globe_page
@@ -30,11 +31,6 @@ def run(
     figure: Path,
     output: Path | None,
     effects: str | None,
-    lonlat: tuple[float, float] | None,
-    facing: str,
-    height_m: float,
-    altitude: float,
-    altitude_datum: str,
     cesium: Path | None,
     mask: Path | None,
     keypoints: Path | None,
@@ -51,29 +47,37 @@ def run(
     overwrite: bool,
     quiet: bool,
     verbose: int,
+    **where: Any,
 ) -> None:
-    """What `fig2mesh view FIGURE …` does; the parameters are the options of the command line."""
+    """What `fig2mesh view FIGURE …` does; the parameters are the options of the command line.
+
+    where : the fields of `PlaceRequest`
+    """
     configure_logging(quiet, verbose)
-    placement = placement_for(lonlat, facing, height_m, altitude, altitude_datum)
+    request = PlaceRequest(**where)
+    sheet = open_map(request)
     wanted = None if effects is None else _effects(effects)
     if output is not None:
         if output.suffix.lower() not in (".html", ".htm"):
             raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
         check_text(output, overwrite, "-o", "name")
-    if cesium is not None and (placement is None or output is not None):
+    if cesium is not None and (not request.somewhere or output is not None):
         raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
-    folders = {CESIUM: find_cesium(cesium)} if placement is not None and output is None else {}
+    folders = {CESIUM: find_cesium(cesium)} if request.somewhere and output is None else {}
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
     settings = settings_for(
         quality, parts=parts, textures=textures, contours=contours, device=torch_device(device), seed=seed
     )
+    placed = place(request, sheet, drawn, figure)
+    tell(placed)
     server = page_server("", port) if output is None else None  # a port that is taken is told before the work
     if server is not None:
         server.server_close()
     with progress(quiet) as advance:
-        scene = scene_of(drawn, settings, height_m, advance)
+        scene = scene_of(drawn, settings, placed.height_m, advance)
         advance("page")
-        page = view_page(scene, wanted) if placement is None else globe_page(scene, placement, f"{CESIUM}/", wanted)
+        there = placed.placement
+        page = view_page(scene, wanted) if there is None else globe_page(scene, there, f"{CESIUM}/", wanted)
     if output is not None:
         write_text(output, page, "name")
         log.info("%s: %.1f MB", output, len(page) / 1e6)

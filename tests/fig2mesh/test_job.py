@@ -41,7 +41,7 @@ def test_report_tells_what_was_made(finished: Run) -> None:
     assert measures["front_ssim"] > 0.9
     assert 0.3 < measures["observed"]["torso"] < 0.7
     stages = [stage["stage"] for stage in finished.report["stages"]]
-    assert stages[:4] == ["lift", "parts", "body", "cloud"]
+    assert stages[:5] == ["place", "lift", "parts", "body", "cloud"]
     assert all(stage["seconds"] >= 0 and stage["peak_mb"] > 0 for stage in finished.report["stages"])
     assert finished.report["placement"]["heading_deg"] == 45.0
     levels = finished.report["lods"]

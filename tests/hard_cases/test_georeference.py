@@ -14,7 +14,7 @@ from exporters.asset import Asset
 from exporters.glb import write_glb
 from exporters.gltf_reader import read_gltf
 from exporters.tiles import write_tileset
-from fig2mesh.job import placement_for
+from fig2mesh.place import PlaceRequest, placement_of
 from georef.geodesy import ecef_from_asset, ecef_from_geodetic, geodetic_from_ecef, tile_from_asset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import HEIGHT, asset
@@ -138,10 +138,11 @@ def test_vertices_at_the_scale_of_the_earth(
     "places are not wrapped or clipped: 180.0000001 is more often a typing error than a place",
 )
 def test_places_that_are_hardly_there(lonlat: tuple[float, float], altitude: float, finding: str | None) -> None:
+    request = PlaceRequest(lonlat, "N", None, altitude, "ellipsoid")
     if finding is None:
-        placed = placement_for(lonlat, "N", 1.79, altitude, "ellipsoid")
+        placed = placement_of(request)
         assert placed is not None
         assert (placed.lon_deg, placed.lat_deg, placed.height_m) == (*lonlat, altitude)
         return
     with pytest.raises(ValueError, match=finding):
-        placement_for(lonlat, "N", 1.79, altitude, "ellipsoid")
+        placement_of(request)

@@ -1,0 +1,265 @@
+"""A georeferenced map sheet: from pixels of its picture to places on the earth.
+
+The transformation runs from IMAGE to a plane (MAP, or one fitted about the control points), the plane's projection
+from there to GEODETIC. Scale, bearing and distortion at a pixel are measured on the ellipsoid itself, by what one
+pixel up, down, left and right are on the ground: so the convergence of the meridians is in them.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from georef.bearing import normalized_bearing
+from georef.errors import PlacementError
+from georef.geodesy import ecef_from_geodetic, enu_at
+from georef.sheets.controls import Affine, Controls, FloatArray, on_picture
+from georef.sheets.find import OPTION, find_georeference
+from georef.sheets.fit import METHODS, Map, fit
+from georef.sheets.hull import convex_hull, nearest_in
+from georef.sheets.quality import Quality, distances_m, quality_of
+from georef.sheets.reference import Plane, crs_of, fitting_plane, local_plane, plane_of
+
+if TYPE_CHECKING:
+    from pyproj import CRS
+
+TRANSFORMS = ("auto", *METHODS)
+
+COARSE = 0.03
+"""Root mean square residual, as a share of the control points' extent, from which on the points seem not to belong to
+this picture or the reference system not to the sheet: pictorial maps are drawn freely, but not that freely."""
+
+
+MOST_LON, MOST_LAT = 800.0, 100.0
+"""Larger numbers are no angles, in degrees or grads, whatever reference system a file names."""
+
+INACCURATE_M = 1.0
+"""Accuracy of a datum transformation from which on it is told."""
+
+
+@dataclass(frozen=True)
+class SheetPlace:
+    """A pixel of a sheet on the earth.
+
+    lon_deg, lat_deg : GEODETIC
+    up_bearing_deg : compass bearing of the sheet's "up", degrees clockwise from north, in [0, 360)
+    down_bearing_deg : of its "down", towards the reader
+    up_m, across_m : metres on the ground that a pixel is along and across "up"
+    stretch : greatest local scale over the least; 1 where the map is conformal
+    mirrored : the sheet shows the ground as a mirror does
+    outside_m : distance on the ground to the hull of the control points; 0 inside; None where there are none
+    notes : what is to be told of this place, one line each
+    """
+
+    lon_deg: float
+    lat_deg: float
+    up_bearing_deg: float
+    down_bearing_deg: float
+    up_m: float
+    across_m: float
+    stretch: float
+    mirrored: bool
+    outside_m: float | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class MapSheet:
+    """A picture of a map whose place on the earth is known.
+
+    file : what the georeference was read from; picture : None where it is not at hand
+    size : of the picture, px; None where it is not known
+    method : of the transformation; "given" where the file has the map itself
+    crs : of the file's coordinates; plane : what the transformation leads to
+    pixels : (N, 2) control points, IMAGE; none where the map is given
+    notes : what is to be told of the sheet, one line each
+    """
+
+    file: Path
+    picture: Path | None
+    size: tuple[float, float] | None
+    method: str
+    crs: str
+    plane: Plane
+    to_plane: Map
+    pixels: FloatArray
+    quality: Quality | None
+    notes: tuple[str, ...]
+
+    def lonlat(self, pixels: FloatArray) -> FloatArray:
+        """(N, 2) GEODETIC longitude and latitude, degrees, of (N, 2) IMAGE pixels.
+
+        Raises PlacementError for pixels that are no place on earth.
+        """
+        return self.plane.to_lonlat(self.to_plane(np.asarray(pixels, np.float64).reshape(-1, 2)))
+
+    def place(self, x: float, y: float, source: str = "--at") -> SheetPlace:
+        """Where a pixel of the sheet is, and how the sheet lies there.
+
+        x, y : IMAGE, px
+        Raises PlacementError for pixels off the sheet or off the earth, and where the map folds.
+        """
+        if not (math.isfinite(x) and math.isfinite(y)):
+            raise PlacementError(source, f"{x:g} {y:g} is no pixel", "give finite numbers")
+        if self.size is not None and not (0 <= x <= self.size[0] and 0 <= y <= self.size[1]):
+            finding = f"{x:g} {y:g} is not on the sheet of {self.size[0]:g}×{self.size[1]:g} px"
+            raise PlacementError(source, finding, "give X from the left and Y from the top, in pixels")
+        around = np.array([[x, y], [x - 0.5, y], [x + 0.5, y], [x, y - 0.5], [x, y + 0.5]])
+        lonlat = self.lonlat(around)
+        lon, lat = lonlat[0].tolist()
+        ground = _on_ground(lonlat, lon, lat)
+        right, down = ground[2] - ground[1], ground[4] - ground[3]
+        matrix = np.stack([right, down], axis=1)
+        scales = np.linalg.svd(matrix, compute_uv=False)
+        if not np.isfinite(scales).all() or scales[1] <= 1e-9 * scales[0] or scales[1] == 0:
+            raise PlacementError(source, f"the map folds or ends at {x:g} {y:g}", "check the georeference of the sheet")
+        mirrored = bool(np.linalg.det(matrix) > 0)
+        notes = []
+        if mirrored:
+            notes.append(f"{self.file}: at {x:g} {y:g} the map is mirrored; check the control points")
+        outside = self._outside(np.array([x, y]), lonlat[:1])
+        if outside:
+            notes.append(f"{self.file}: {x:g} {y:g} lies {_metres(outside)} outside the control points' hull")
+        accuracy = self.plane.accuracy_m()
+        if accuracy is not None and accuracy > INACCURATE_M:
+            notes.append(f"{self.crs}: known to {accuracy:g} m against WGS 84 without grids that are not at hand")
+        up = _bearing(-down)
+        return SheetPlace(
+            lon, lat, up, normalized_bearing(up + 180.0), float(np.linalg.norm(down)), float(np.linalg.norm(right)),
+            float(scales[0] / scales[1]), mirrored, outside, tuple(notes),
+        )  # fmt: skip
+
+    def _outside(self, pixel: FloatArray, lonlat: FloatArray) -> float | None:
+        if not len(self.pixels):
+            return None
+        nearest = nearest_in(convex_hull(self.pixels), pixel)
+        if np.array_equal(nearest, pixel):
+            return 0.0
+        return float(distances_m(self.lonlat(nearest[None]), lonlat)[0])
+
+
+def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = None) -> MapSheet:
+    """Read the georeference of a sheet.
+
+    sheet : the picture, or a .points file, annotation or world file; see `georef.sheets.find`
+    transform : one of `TRANSFORMS`; auto: what the file asks for, else affine, helmert for two points
+    map_crs : reference system of the sheet's coordinates, where its files name none or a wrong one; for control
+        points in longitude and latitude, the projection in which the transformation is fitted
+
+    Raises PlacementError where the georeference is missing, ambiguous, damaged or not enough.
+    """
+    found = find_georeference(sheet)
+    notes: list[str] = []
+    if isinstance(found.georeference, Affine):
+        return _given(found.georeference, found.file, found.picture, found.size, found.crs, transform, map_crs)
+    controls = found.georeference
+    if found.size is not None:
+        controls = on_picture(controls, found.size, found.file)
+    if controls.left_out:
+        notes.append(f"{found.file}: {controls.left_out} control points are switched off")
+    method = _method(controls, transform, found.file, notes)
+    crs, plane, coordinates = _plane_for(controls, found.crs, map_crs, found.file, notes)
+    fitted = fit(method, controls.pixels, coordinates, found.file)
+    quality = quality_of(fitted, plane, controls.pixels, coordinates)
+    given = plane.to_lonlat(coordinates)
+    extent = float(distances_m(given, np.broadcast_to(given[:1], given.shape)).max())
+    worst = max(quality.rmse_m, quality.left_out_rmse_m or 0.0)
+    if worst > COARSE * extent:
+        notes.append(
+            f"{found.file}: control points are missed by {_metres(worst)}, {worst / extent:.0%} of their extent; "
+            "check points and reference system"
+        )
+    size = found.size if found.size is not None else controls.size
+    return MapSheet(
+        found.file, found.picture, size, method, crs, plane, fitted.apply, controls.pixels, quality, tuple(notes)
+    )
+
+
+def _given(
+    affine: Affine,
+    file: Path,
+    picture: Path | None,
+    size: tuple[float, float] | None,
+    named: str | None,
+    transform: str,
+    map_crs: str | None,
+) -> MapSheet:
+    if transform != "auto":
+        finding = f"{file.name} gives the map itself, without control points"
+        raise PlacementError(f"--map-transform {transform}", finding, "leave --map-transform away")
+    notes: list[str] = []
+    crs = _chosen(named, map_crs, file, notes)
+    matrix = affine.matrix
+    return MapSheet(
+        file, picture, size, "given", crs.name, plane_of(crs, file),
+        lambda points: np.asarray(points @ matrix[:, :2].T + matrix[:, 2]),
+        np.empty((0, 2)), None, tuple(notes),
+    )  # fmt: skip
+
+
+def _chosen(named: str | None, map_crs: str | None, file: Path, notes: list[str]) -> CRS:
+    """The reference system of the coordinates: --map-crs, or what the files name."""
+    if map_crs is None and named is None:
+        finding = "no reference system in it or beside it"
+        raise PlacementError(f"{OPTION} {file}", finding, "pass --map-crs, such as EPSG:2056, or put a .prj beside it")
+    if map_crs is None:
+        return crs_of(str(named), file)
+    crs = crs_of(map_crs)
+    own = _own(named, file)
+    if own is not None and own != crs:
+        notes.append(f"{file}: names {own.name}; --map-crs is used instead")
+    return crs
+
+
+def _own(named: str | None, file: Path) -> CRS | None:
+    """The reference system that the files name; None where they name none that is known."""
+    with suppress(PlacementError):
+        return None if named is None else crs_of(named, file)
+    return None
+
+
+def _method(controls: Controls, transform: str, file: Path, notes: list[str]) -> str:
+    if transform != "auto":
+        return transform
+    if controls.method in METHODS:
+        return controls.method
+    if controls.method is not None:
+        notes.append(f"{file}: its transformation, {controls.method}, is not known here; affine is used")
+    return "helmert" if len(controls.pixels) == 2 else "affine"
+
+
+def _plane_for(
+    controls: Controls, named: str | None, map_crs: str | None, file: Path, notes: list[str]
+) -> tuple[str, Plane, FloatArray]:
+    """The name of the points' reference system, the plane to fit in, and the points in it."""
+    own = None if map_crs is None else _own(named, file)
+    if own is not None and own.is_geographic and (np.abs(controls.coordinates) <= (MOST_LON, MOST_LAT)).all():
+        crs, wanted, source = own, map_crs, "--map-crs"
+    else:
+        crs, wanted, source = _chosen(named, map_crs, file, notes), controls.plane, str(file)
+    plane = plane_of(crs, file)
+    if not plane.geographic:
+        return crs.name, plane, controls.coordinates
+    lonlat = plane.to_lonlat(controls.coordinates)
+    target = None if wanted is None else crs_of(wanted, source)
+    fitted = local_plane(lonlat, controls.pixels) if target is None or target.is_geographic else fitting_plane(target)
+    return crs.name, fitted, fitted.from_lonlat(lonlat)
+
+
+def _on_ground(lonlat: FloatArray, lon: float, lat: float) -> FloatArray:
+    """(N, 2) metres east and north of a place, in the plane that touches the ellipsoid there."""
+    ecef = ecef_from_geodetic(np.concatenate([lonlat, np.zeros((len(lonlat), 1))], axis=1))
+    return enu_at(lon, lat).inverse().apply(ecef)[:, :2]
+
+
+def _bearing(vector: FloatArray) -> float:
+    return normalized_bearing(math.degrees(math.atan2(vector[0], vector[1])))
+
+
+def _metres(value: float) -> str:
+    return f"{value / 1000:.3g} km" if value >= 1000 else f"{value:.3g} m"

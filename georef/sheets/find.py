@@ -1,0 +1,144 @@
+"""Which files belong to a sheet: the picture, and what lies beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from georef.errors import PlacementError
+from georef.sheets.annotation import is_annotation, read_annotation
+from georef.sheets.controls import Affine, Controls
+from georef.sheets.pictures import SUFFIXES, Picture, read_picture
+from georef.sheets.points_file import read_points_file
+from georef.sheets.world_file import read_prj, read_world_file
+
+OPTION = "--map"
+
+SAME_PX = 0.01
+"""A world file that differs from a GeoTIFF's tags by less than this anywhere says the same."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """picture : the sheet's picture, None where only its georeference is there; size : of the picture; file : what
+    the georeference was read from; georeference : with the reference system that any of the files names."""
+
+    picture: Path | None
+    size: tuple[int, int] | None
+    file: Path
+    georeference: Affine | Controls
+    crs: str | None
+
+
+def find_georeference(sheet: Path) -> Found:
+    """The georeference of a sheet.
+
+    sheet : a picture, whose georeference is in its tags or beside it, or the georeference itself: a .points file, an
+        annotation, a world file
+
+    Raises PlacementError where there is none, or more than one that could be meant.
+    """
+    if not sheet.is_file():
+        raise PlacementError(f"{OPTION} {sheet}", "no such file", "give the sheet's picture or its georeference")
+    kind = _kind(sheet)
+    if kind == "picture":
+        return _of_picture(sheet)
+    picture = _picture_beside(sheet)
+    facts = None if picture is None else read_picture(picture)
+    georeference = _read(sheet, kind)
+    crs = georeference.crs or _prj_beside(sheet, picture) or (facts.crs if facts is not None else None)
+    return Found(picture, None if facts is None else facts.size, sheet, georeference, crs)
+
+
+def _kind(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix in SUFFIXES:
+        return "picture"
+    if suffix == ".points":
+        return "points"
+    if suffix in (".json", ".jsonld", ".geojson"):
+        return "annotation"
+    if suffix == ".wld" or (3 <= len(suffix) <= 6 and suffix.endswith("w")):
+        return "world"
+    finding = f"its suffix is {path.suffix!r}"
+    raise PlacementError(f"{OPTION} {path}", finding, "give a picture, .points, an annotation (.json) or a world file")
+
+
+def _read(path: Path, kind: str) -> Affine | Controls:
+    if kind == "world":
+        return read_world_file(path)
+    return read_points_file(path) if kind == "points" else read_annotation(path)
+
+
+def _of_picture(sheet: Path) -> Found:
+    facts = read_picture(sheet)
+    world = _present(sheet, _world_suffixes(sheet.suffix))
+    points = _present(sheet, (".points",))
+    notes = [path for path in _present(sheet, (".json", ".jsonld", ".geojson")) if is_annotation(path)]
+    candidates = [*world, *points, *notes]
+    if facts.georeference is not None:
+        # Programs write world files beside GeoTIFFs; one that says the same is no second opinion.
+        candidates = [path for path in candidates if path not in world or not _same(facts, read_world_file(path))]
+        if not candidates:
+            return Found(sheet, facts.size, sheet, facts.georeference, facts.crs or _prj_beside(sheet, sheet))
+        candidates = [sheet, *candidates]
+    if not candidates:
+        tried = ", ".join(dict.fromkeys(sheet.stem + s for s in (*_world_suffixes(sheet.suffix), ".points", ".json")))
+        raise PlacementError(f"{OPTION} {sheet}", "no georeference in it or beside it", f"put one there: {tried}")
+    if len(candidates) > 1:
+        shown = " and ".join("its tags" if path == sheet else path.name for path in candidates)
+        raise PlacementError(
+            f"{OPTION} {sheet}", f"{shown} could be meant", "name the one to use instead of the picture"
+        )
+    file = candidates[0]
+    georeference = _read(file, _kind(file))
+    crs = georeference.crs or _prj_beside(file, sheet) or facts.crs
+    return Found(sheet, facts.size, file, georeference, crs)
+
+
+def _world_suffixes(suffix: str) -> tuple[str, ...]:
+    """.png → .pgw, .pngw, .wld"""
+    return (f".{suffix[1]}{suffix[-1]}w", f"{suffix}w", ".wld")
+
+
+def _present(path: Path, suffixes: tuple[str, ...]) -> list[Path]:
+    """Files named like `path` with one of the suffixes in place of its own or after it, in either case."""
+    names = dict.fromkeys(
+        base + case for base in (path.stem, path.name) for s in suffixes for case in (s.lower(), s.upper())
+    )
+    found: list[Path] = []
+    for name in names:
+        candidate = path.with_name(name)
+        # File systems that do not tell cases apart find the same file twice.
+        if candidate != path and candidate.is_file() and not any(candidate.samefile(other) for other in found):
+            found.append(candidate)
+    return found
+
+
+def _picture_beside(file: Path) -> Path | None:
+    if Path(file.stem).suffix.lower() in SUFFIXES and file.with_name(file.stem).is_file():
+        return file.with_name(file.stem)
+    found = _present(file.with_name(file.stem + ".x"), SUFFIXES)
+    if len(found) > 1:
+        shown = " and ".join(path.name for path in found)
+        raise PlacementError(f"{OPTION} {file}", f"{shown} stand beside it", "keep one, the sheet, under this name")
+    return found[0] if found else None
+
+
+def _prj_beside(file: Path, picture: Path | None) -> str | None:
+    for path in (file, picture):
+        if path is not None and (found := _present(path, (".prj",))):
+            return read_prj(found[0])
+    return None
+
+
+def _same(facts: Picture, world: Affine) -> bool:
+    if not isinstance(facts.georeference, Affine):
+        return False
+    inner, other = facts.georeference.matrix, world.matrix
+    width, height = facts.size
+    corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]], np.float64)
+    apart = corners @ (inner - other).T
+    return bool(np.abs(np.linalg.solve(inner[:, :2], apart.T)).max() < SAME_PX)

@@ -1,0 +1,134 @@
+"""What a picture file says without being decoded: its size, and the GeoTIFF tags of a TIFF.
+
+https://docs.ogc.org/is/19-008r4/19-008r4.html
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from georef.errors import PlacementError
+from georef.sheets.controls import MAX_POINTS, Affine, Controls, make_controls
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".jp2", ".gif", ".bmp")
+
+PIXEL_SCALE, TIEPOINTS, TRANSFORMATION = 33550, 33922, 34264
+GEO_KEYS, GEO_DOUBLES, GEO_ASCII = 34735, 34736, 34737
+MODEL_TYPE, RASTER_TYPE, GEODETIC_CRS, PROJECTED_CRS = 1024, 1025, 2048, 3072
+CITATIONS = (3073, 2049, 1026)
+POINT, GEOGRAPHIC, USER_DEFINED = 2, 2, 32767
+ORIENTATION = 274
+ESRI = "ESRI PE String ="
+
+
+@dataclass(frozen=True)
+class Picture:
+    """size : width and height, px; georeference : what its tags say, None where they say nothing; crs : as in
+    `Controls`, also where tags name only the reference system."""
+
+    size: tuple[int, int]
+    georeference: Affine | Controls | None = None
+    crs: str | None = None
+
+
+def read_picture(path: Path) -> Picture:
+    """Size and tags of a picture, of whatever size: nothing is decoded.
+
+    Raises PlacementError for files that are no pictures, have broken tags, or are turned by their EXIF orientation,
+    since georeferences count pixels as stored.
+    """
+    # The plugins of the formats above register themselves; `Image.init` would import thirty more.
+    from PIL import Image, Jpeg2KImagePlugin, TiffImagePlugin, WebPImagePlugin  # noqa: F401
+
+    Image.preinit()
+    try:
+        with path.open("rb") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            head = file.read(16)
+            file.seek(0)
+            # Not Image.open, which refuses large pictures before it is known whether anybody wants their pixels.
+            for factory, accept in Image.OPEN.values():
+                accepted = accept is None or accept(head)
+                if accepted and not isinstance(accepted, str):
+                    try:
+                        image = factory(file, str(path))
+                        break
+                    except (SyntaxError, IndexError, TypeError, KeyError, EOFError, ValueError, OSError):
+                        file.seek(0)
+            else:
+                raise PlacementError(path, "no picture that can be read", "give a PNG, JPEG, TIFF or WebP as the sheet")
+            size = (int(image.size[0]), int(image.size[1]))
+            tags = dict(getattr(image, "tag_v2", None) or {})
+            turned = image.getexif().get(ORIENTATION, 1)
+    except PlacementError:
+        raise
+    except FileNotFoundError:
+        raise PlacementError(path, "no such file", "check the path of the sheet") from None
+    except Exception as error:
+        # Parsers of damaged headers raise whatever they stumble over.
+        reason = getattr(error, "strerror", None) or type(error).__name__
+        raise PlacementError(path, f"cannot be read ({reason})", "give an intact picture") from None
+    if turned not in (0, 1):
+        raise PlacementError(
+            path, "its EXIF orientation turns it", "save it upright; georeferences count stored pixels"
+        )
+    if not any(tag in tags for tag in (PIXEL_SCALE, TIEPOINTS, TRANSFORMATION, GEO_KEYS)):
+        return Picture(size)
+    try:
+        return _georeferenced(path, size, tags)
+    except (TypeError, ValueError, IndexError, KeyError):
+        raise PlacementError(path, "its GeoTIFF tags are damaged", "give an intact GeoTIFF, or a world file") from None
+
+
+def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> Picture:
+    keys = _geo_keys(tags)
+    crs = _crs(keys)
+    # Where the raster type is "point", raster coordinates count from the centre of the first pixel.
+    shift = 0.5 if keys.get(RASTER_TYPE) == POINT else 0.0
+    tiepoints = np.array(tags.get(TIEPOINTS, ()), np.float64).reshape(-1, 6)
+    if len(tiepoints) > MAX_POINTS:
+        raise PlacementError(path, f"{len(tiepoints)} control points", f"give at most {MAX_POINTS}")
+    if TRANSFORMATION in tags:
+        matrix = np.array(tags[TRANSFORMATION], np.float64).reshape(4, 4)[:2][:, [0, 1, 3]]
+    elif PIXEL_SCALE in tags and len(tiepoints) == 1:
+        scale_x, scale_y = (float(v) for v in tags[PIXEL_SCALE][:2])
+        column, row, _, x, y, _ = tiepoints[0]
+        matrix = np.array([[scale_x, 0.0, x - scale_x * column], [0.0, -scale_y, y + scale_y * row]])
+    elif len(tiepoints) > 1:
+        rows = np.concatenate([tiepoints[:, :2] + shift, tiepoints[:, 3:5]], axis=1)
+        return Picture(size, make_controls(path, rows, crs=crs), crs)
+    else:
+        return Picture(size, None, crs)
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:, :2])) <= 1e-300:
+        raise PlacementError(path, "the map in its tags has no area", "give an intact GeoTIFF, or a world file")
+    matrix[:, 2] -= matrix[:, :2] @ (shift, shift)
+    return Picture(size, Affine(matrix, crs), crs)
+
+
+def _geo_keys(tags: dict[int, Any]) -> dict[int, Any]:
+    directory = [int(value) for value in tags.get(GEO_KEYS, ())]
+    keys: dict[int, Any] = {}
+    for start in range(4, min(len(directory), 4 + 4 * (directory[3] if len(directory) > 3 else 0)), 4):
+        key, location, count, value = directory[start : start + 4]
+        if location == 0:
+            keys[key] = value
+        elif location == GEO_ASCII:
+            keys[key] = str(tags.get(GEO_ASCII, ""))[value : value + count].rstrip("|\0 ")
+    return keys
+
+
+def _crs(keys: dict[int, Any]) -> str | None:
+    """The reference system that the keys name by code, or as Esri's WKT in a citation."""
+    for key in (PROJECTED_CRS, *((GEODETIC_CRS,) if keys.get(MODEL_TYPE) == GEOGRAPHIC else ())):
+        if keys.get(key) not in (None, 0, USER_DEFINED):
+            return f"EPSG:{keys[key]}"
+    for key in CITATIONS:
+        text = keys.get(key)
+        if isinstance(text, str) and ESRI in text:
+            return text.split(ESRI, 1)[1].strip()
+    return None

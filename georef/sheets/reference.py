@@ -1,0 +1,185 @@
+"""Reference systems of sheets, and the planes in which transformations are fitted, from and to WGS 84.
+
+Every conversion is asked of pyproj without ballpark transformations: where no real one is known, that is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from georef.errors import PlacementError
+from georef.sheets.controls import FloatArray
+
+if TYPE_CHECKING:
+    from pyproj import CRS, Transformer
+
+OPTION = "--map-crs"
+
+WIDE_DEG = 60.0
+"""Control points further than this from their middle are those of a map of the world, for which no local plane is
+anywhere near the map's projection."""
+
+MAX_SEAMS = 24
+"""Gaps between longitudes that are tried as the seam of a map of the world."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Coordinates of a sheet, or a plane to fit in.
+
+    name : for reports
+    to_lonlat : (N, 2) coordinates → (N, 2) WGS 84 longitude and latitude, degrees, longitude in [-180, 180]
+    from_lonlat : the reverse
+    accuracy_m : what is known of the transformation's accuracy, asked after use; None: it is exact, or unknown
+    geographic : coordinates are angles
+    """
+
+    name: str
+    to_lonlat: Callable[[FloatArray], FloatArray]
+    from_lonlat: Callable[[FloatArray], FloatArray]
+    accuracy_m: Callable[[], float | None]
+    geographic: bool = False
+
+
+def crs_of(text: str, source: object = OPTION) -> CRS:
+    """The horizontal part of a reference system named by a code (EPSG:2056), WKT, PROJ string or PROJJSON.
+
+    Raises PlacementError for unknown ones and those that are not tied to the earth.
+    """
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    shown = " ".join(text.split())[:60]
+    try:
+        crs = CRS.from_user_input(text.strip())
+    except (CRSError, UnicodeError, ValueError):
+        raise PlacementError(source, f"{shown!r} is no reference system", "give a code such as EPSG:2056") from None
+    if crs.is_compound:
+        crs = crs.sub_crs_list[0]
+    if crs.is_geocentric or not (crs.is_projected or crs.is_geographic):
+        finding = f"{shown!r} has no eastings and northings, nor longitudes and latitudes on the earth"
+        raise PlacementError(source, finding, "give the sheet's projected or geographic reference system")
+    return crs
+
+
+def plane_of(crs: CRS, source: object = OPTION) -> Plane:
+    """The plane of a reference system."""
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    try:
+        transformer = Transformer.from_crs(crs, "EPSG:4326", always_xy=True, allow_ballpark=False)
+    except ProjError:
+        finding = f"no transformation from {crs.name} to WGS 84 is known"
+        raise PlacementError(source, finding, "give a reference system that pyproj can tie to WGS 84") from None
+    return _plane(crs.name, transformer, crs.is_geographic, source)
+
+
+def fitting_plane(crs: CRS, source: object = OPTION) -> Plane:
+    """The plane of a reference system's projection, in which points given in longitude and latitude are fitted.
+
+    The datum is left out, there and back: it is only the shape of the projection that a fit needs, so that it can be
+    undone exactly, and old maps' projections are often named on a sphere that nothing ties to WGS 84.
+    """
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import CRSError, ProjError
+
+    try:
+        # Degrees from Greenwich on its ellipsoid: some systems count grads from Paris.
+        ellipsoid = crs.ellipsoid
+        radii = f"+a={ellipsoid.semi_major_metre!r} +b={ellipsoid.semi_minor_metre!r}"
+        transformer = Transformer.from_crs(crs, CRS.from_proj4(f"+proj=longlat {radii} +no_defs"), always_xy=True)
+    except (ProjError, CRSError, AttributeError):
+        raise PlacementError(source, f"{crs.name} cannot be computed", "give another projection") from None
+    return _plane(f"{crs.name}, its projection alone", transformer, False, source)
+
+
+def local_plane(lonlat: FloatArray, pixels: FloatArray) -> Plane:
+    """A plane for control points in longitude and latitude, (N, 2) each, degrees and IMAGE.
+
+    A stereographic projection about their middle: conformal, so that a similarity of the sheet stays one, and without
+    any special case at the poles and the antimeridian. For points that span more of the globe than `WIDE_DEG` to
+    each side, longitude and latitude themselves, with the seam where the pixels say that the map has it.
+    """
+    from pyproj import Transformer
+
+    lon, lat = np.radians(lonlat.T)
+    points = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=1)
+    middle = points.mean(axis=0)
+    length = float(np.linalg.norm(middle))
+    farthest = 180.0
+    if length > 1e-3:
+        farthest = float(np.degrees(np.arccos(np.clip(points @ middle / length, -1.0, 1.0)).max()))
+    if farthest > WIDE_DEG:
+        return _plate(lonlat, pixels)
+    lon_0 = float(np.degrees(np.arctan2(middle[1], middle[0])))
+    lat_0 = float(np.degrees(np.arcsin(np.clip(middle[2] / length, -1.0, 1.0))))
+    transformer = Transformer.from_pipeline(
+        "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad "
+        f"+step +proj=stere +lat_0={lat_0:.9f} +lon_0={lon_0:.9f} +k=1 +ellps=WGS84"
+    )
+    return _plane(f"stereographic about {lon_0:.4f} {lat_0:.4f}", transformer, False, "control points", inverse=True)
+
+
+def _plate(lonlat: FloatArray, pixels: FloatArray) -> Plane:
+    # The seam is in one of the gaps between longitudes; in the right one they follow the pixels most evenly.
+    ordered = np.sort(lonlat[:, 0])
+    gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
+    basis = np.concatenate([pixels - pixels.mean(axis=0), np.ones((len(pixels), 1))], axis=1)
+    best, middle = np.inf, 0.0
+    for index in np.argsort(-gaps)[:MAX_SEAMS]:
+        opposite = float(ordered[index] + gaps[index] / 2 + 180.0)
+        turned = (lonlat[:, 0] - opposite + 180.0) % 360.0 - 180.0
+        missed = turned - basis @ np.linalg.lstsq(basis, turned, rcond=None)[0]
+        if (square := float(missed @ missed)) < best:
+            best, middle = square, (opposite + 180.0) % 360.0 - 180.0
+
+    def to_lonlat(points: FloatArray) -> FloatArray:
+        return _checked(np.stack([points[:, 0] + middle, points[:, 1]], axis=1), "control points")
+
+    def from_lonlat(points: FloatArray) -> FloatArray:
+        return np.stack([(points[:, 0] - middle + 180.0) % 360.0 - 180.0, points[:, 1]], axis=1)
+
+    return Plane(f"longitude and latitude about {middle:.4f}", to_lonlat, from_lonlat, lambda: None)
+
+
+def _plane(name: str, transformer: Transformer, geographic: bool, source: object, inverse: bool = False) -> Plane:
+    def convert(points: FloatArray, back: bool) -> FloatArray:
+        direction = "INVERSE" if back != inverse else "FORWARD"
+        return np.stack(transformer.transform(points[:, 0], points[:, 1], direction=direction), axis=1)
+
+    def from_lonlat(points: FloatArray) -> FloatArray:
+        result = convert(points, back=True)
+        if not np.isfinite(result).all():
+            finding = f"{points[~np.isfinite(result).all(axis=1)][0].tolist()} is outside the area of {name}"
+            raise PlacementError(source, finding, "give the reference system of this sheet")
+        return result
+
+    def accuracy() -> float | None:
+        from pyproj.exceptions import ProjError
+
+        try:
+            accuracy = float(transformer.get_last_used_operation().accuracy)
+        except ProjError:
+            return None
+        return accuracy if accuracy > 0 else None
+
+    def to_lonlat(points: FloatArray) -> FloatArray:
+        return _checked(convert(points, back=False), source, name)
+
+    return Plane(name, to_lonlat, from_lonlat, accuracy, geographic)
+
+
+def _checked(lonlat: FloatArray, source: object, name: str = "the map") -> FloatArray:
+    """Longitudes brought into [-180, 180]; an error for what is no place on earth."""
+    # Two turns: some files count on beyond the antimeridian.
+    bad = ~np.isfinite(lonlat).all(axis=1) | (np.abs(lonlat[:, 1]) > 90.0 + 1e-9) | (np.abs(lonlat[:, 0]) > 720.0)
+    if bad.any():
+        finding = f"a point of the sheet lies outside the area of {name}"
+        raise PlacementError(source, finding, f"check the reference system, and pass {OPTION} where it is another one")
+    lon = np.where(np.abs(lonlat[:, 0]) > 180.0, (lonlat[:, 0] + 180.0) % 360.0 - 180.0, lonlat[:, 0])
+    return np.stack([lon, np.clip(lonlat[:, 1], -90.0, 90.0)], axis=1)
