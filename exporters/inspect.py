@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import itertools
 import json
-import math
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -20,7 +19,9 @@ from exporters.check_usd import open_stage
 from exporters.errors import ExportError
 from exporters.georeference import placement_of_tile
 from exporters.gltf_reader import Gltf, read_gltf
+from exporters.ktx2 import IDENTIFIER, size_of
 from exporters.solid import measure_topology, merged_by_position
+from exporters.usd_place import anchor_of, heading_of
 from exporters.validate import read_triangles
 
 
@@ -89,6 +90,8 @@ def _files(*paths: Path) -> dict[str, int]:
 def _texture_size(data: bytes) -> list[int]:
     from PIL import Image
 
+    if data.startswith(IDENTIFIER):
+        return list(size_of(data))
     with Image.open(io.BytesIO(data)) as image:
         return [image.width, image.height]
 
@@ -105,7 +108,7 @@ def _gltf_facts(gltf: Gltf) -> dict[str, Any]:
     asset = gltf.document.get("asset", {})
     extras = asset.get("extras", {})
     meshes = range(len(gltf.items("meshes")))
-    solids = [gltf.solid_arrays(mesh) for mesh in meshes]
+    solids = gltf.scene_solids()
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
     vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
     faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
@@ -118,7 +121,11 @@ def _gltf_facts(gltf: Gltf) -> dict[str, Any]:
         "name": next((node["name"] for node in gltf.items("nodes") if "name" in node), None),
         "copyright": asset.get("copyright"),
         "generator": asset.get("generator"),
-        "vertices": sum(len(gltf.mesh_arrays(mesh)[0]) for mesh in meshes),
+        "vertices": sum(
+            len(gltf.mesh_arrays(mesh, primitive)[0])
+            for mesh in meshes
+            for primitive in range(len(gltf.items("meshes")[mesh]["primitives"]))
+        ),
         **_solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
         "texture_px": _texture_size(gltf.image(0)) if gltf.items("images") else None,
         "parts": _part_names(gltf, tables[0]) if tables else None,
@@ -212,18 +219,11 @@ def _inspect_usd(path: Path) -> dict[str, Any]:
 
 
 def _usd_placement(prim: Any, recorded: dict[str, Any]) -> dict[str, Any] | None:
-    from pxr import Gf, UsdGeom
-
-    if not prim or not prim.HasAttribute("cesium:anchor:longitude"):
+    place = anchor_of(prim) if prim else None
+    if place is None:
         return None
-    # The stage is east, up, south; where the figure's front, +z, ends up is its heading.
-    front = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0).TransformDir(Gf.Vec3d(0, 0, 1))
-    return recorded | {
-        "lon_deg": prim.GetAttribute("cesium:anchor:longitude").Get(),
-        "lat_deg": prim.GetAttribute("cesium:anchor:latitude").Get(),
-        "height_m": prim.GetAttribute("cesium:anchor:height").Get(),
-        "heading_deg": math.degrees(math.atan2(front[0], -front[2])) % 360.0,
-    }
+    lon, lat, height = place
+    return recorded | {"lon_deg": lon, "lat_deg": lat, "height_m": height, "heading_deg": heading_of(prim)}
 
 
 def _inspect_triangles(path: Path) -> dict[str, Any]:

@@ -16,11 +16,12 @@ from pathlib import Path
 
 from exporters.asset import Asset
 from exporters.errors import ExportError
-from exporters.glb import write_glb, write_gltf
+from exporters.glb import glb_bytes, write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
+from exporters.profiles import GENERAL, Profile, suffix_of
 from exporters.tiles import DEFAULT_VISIBLE_FROM_M, content_name, write_tileset
-from exporters.usd import write_usd
+from exporters.usd import texture_name, write_usd
 
 OutputPath = str | os.PathLike[str]
 
@@ -30,26 +31,32 @@ class Format:
     """A kind of output.
 
     title : for people
-    writer : writes an asset to a path
-    beside : endings, after the stem, of the files written next to the one asked for
+    writer : writes an asset to a path for the client of a profile
+    beside : endings, after the stem, of the files written next to the one asked for; the textures of USD, one for
+        each level of detail, are not among them
     """
 
     title: str
-    writer: Callable[[Asset, Path], None]
+    writer: Callable[[Asset, Path, Profile], None]
     beside: tuple[str, ...] = ()
 
 
 TEXTURE = "_texture.png"
 """Ending of textures beside a model; not `.png` alone, as `figure.png` is usually the drawing itself."""
 
+
+def _same_for_all(writer: Callable[[Asset, Path], None]) -> Callable[[Asset, Path, Profile], None]:
+    return lambda asset, path, profile: writer(asset, path)
+
+
 FORMATS: dict[str, Format] = {
     ".glb": Format("glTF 2.0 binary", write_glb),
     ".gltf": Format("glTF 2.0", write_gltf, (".bin", TEXTURE)),
-    ".usda": Format("OpenUSD text", write_usd, (TEXTURE,)),
-    ".usdc": Format("OpenUSD binary", write_usd, (TEXTURE,)),
-    ".usdz": Format("OpenUSD package", write_usd),
-    ".ply": Format("Stanford PLY", write_ply),
-    ".obj": Format("Wavefront OBJ", write_obj, (".mtl", TEXTURE)),
+    ".usda": Format("OpenUSD text", _same_for_all(write_usd)),
+    ".usdc": Format("OpenUSD binary", _same_for_all(write_usd)),
+    ".usdz": Format("OpenUSD package", _same_for_all(write_usd)),
+    ".ply": Format("Stanford PLY", _same_for_all(write_ply)),
+    ".obj": Format("Wavefront OBJ", _same_for_all(write_obj), (".mtl", TEXTURE)),
 }
 """File formats by suffix; a folder or a tileset.json means 3D Tiles."""
 
@@ -62,22 +69,35 @@ def is_tileset(path: OutputPath) -> bool:
     return file.is_dir() and file.suffix.lower() not in FORMATS  # such as maps/v1.2
 
 
-def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: str = "", lods: int = 1) -> None:
+def has_levels(path: OutputPath) -> bool:
+    """Whether an output holds all levels of detail of an asset, not the finest alone: 3D Tiles and USD."""
+    return is_tileset(path) or Path(path).suffix.lower().startswith(".usd")
+
+
+def check_outputs(
+    paths: Iterable[OutputPath],
+    overwrite: bool = False,
+    name: str = "",
+    lods: int = 1,
+    profile: Profile = GENERAL,
+) -> None:
     """Find out before the work begins what would keep outputs from being written.
 
     paths : all outputs of one asset
     overwrite : existing files may be replaced
     name, lods : of the asset to come, from which the files beside a tileset.json get their names
+    profile : of the client that is to read them
 
-    Raises ExportError naming the first output with an unknown suffix, in a folder that cannot be written to, that
-    exists although `overwrite` is off, or that is asked for twice.
+    Raises ExportError naming the first output with an unknown suffix, that the client does not read, in a folder that
+    cannot be written to, that exists although `overwrite` is off, or that is asked for twice.
     """
     seen: set[str] = set()
     parts: dict[str, Path] = {}
     for path in paths:
         main = _main_file(path)
+        profile.check(os.fspath(path), suffix_of(main))
         check_file(path, main, overwrite)
-        for companion in _companions(path, name, lods):
+        for companion in _companions(path, name, lods, profile):
             if companion.exists() and not overwrite:
                 raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
             parts[os.path.abspath(companion)] = main
@@ -90,7 +110,11 @@ def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: st
 
 
 def write(
-    asset: Asset, path: OutputPath, overwrite: bool = False, visible_from_m: float = DEFAULT_VISIBLE_FROM_M
+    asset: Asset,
+    path: OutputPath,
+    overwrite: bool = False,
+    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    profile: Profile = GENERAL,
 ) -> tuple[Path, ...]:
     """Write an asset in the format that the path names, whole or not at all.
 
@@ -98,18 +122,24 @@ def write(
     path : a file with a suffix of `FORMATS`; a folder or its tileset.json for 3D Tiles. Missing folders are made
     overwrite : replace what is there; in the folder of a tileset only files of the names we write
     visible_from_m : for 3D Tiles, see `exporters.tiles.write_tileset`
+    profile : what the client of the file takes
     returns : the files written, the one that names the others last
 
-    Raises ExportError as `check_outputs` does, and where the disk refuses.
+    Raises ExportError as `check_outputs` does, where the profile needs what is not installed, and where the disk
+    refuses.
     """
     main = _main_file(path)
+    profile.check(os.fspath(path), suffix_of(main))
     check_file(path, main, overwrite)
 
     def fill(stage: Path) -> None:
-        if main.name == "tileset.json":
-            write_tileset(asset, stage, visible_from_m)
-        else:
-            FORMATS[main.suffix.lower()].writer(asset, stage / main.name)
+        if main.name != "tileset.json":
+            FORMATS[main.suffix.lower()].writer(asset, stage / main.name, profile)
+            return
+        write_tileset(asset, stage, visible_from_m)
+        if profile != GENERAL:
+            for lod in range(len(asset.lods)):
+                (stage / content_name(asset.name, lod)).write_bytes(glb_bytes(asset, lod, profile))
 
     return write_whole(path, main, fill, overwrite)
 
@@ -145,11 +175,16 @@ def _main_file(path: OutputPath) -> Path:
     return file
 
 
-def _companions(path: OutputPath, name: str, lods: int) -> list[Path]:
+def _companions(path: OutputPath, name: str, lods: int, profile: Profile) -> list[Path]:
     if is_tileset(path):
         return [_main_file(path).with_name(content_name(name, lod)) for lod in range(lods)] if name else []
     file = Path(path)
-    return [file.with_name(file.stem + ending) for ending in FORMATS[file.suffix.lower()].beside]
+    if file.suffix.lower() in (".usda", ".usdc"):
+        return [file.with_name(texture_name(file.stem, lod)) for lod in range(lods)]
+    endings = FORMATS[file.suffix.lower()].beside
+    if file.suffix.lower() == ".gltf":
+        endings = tuple(profile.texture_ending if ending == TEXTURE else ending for ending in endings)
+    return [file.with_name(file.stem + ending) for ending in endings]
 
 
 def check_file(path: OutputPath, main: Path, overwrite: bool) -> None:

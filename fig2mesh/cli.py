@@ -80,11 +80,18 @@ def cli() -> None:
     help=".glb .gltf .usda .usdc .usdz .ply .obj, or a folder / tileset.json for 3D Tiles; repeatable. "
     "Default: FIGURE's stem + .glb in the current folder.",
 )  # fmt: skip
+@click.option(
+    "--profile", type=click.Choice(["cesiumjs", "cesiumjs-ktx2", "blender", "qgis", "omniverse"]),
+    help="Write for one client: cesiumjs compressed (also with KTX 2 texture), blender and qgis without extensions, "
+    "omniverse as binary USD. Default: what every client takes.",
+)  # fmt: skip
 @figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--triangles", type=click.IntRange(200, 2_000_000), metavar="N", help="Triangles of the finest mesh.")
 @click.option("--texture-size", type=click.IntRange(64, 8192), metavar="PX", help="Texels a side.")
-@click.option("--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles).")
+@click.option(
+    "--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles, USD)."
+)
 @click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
 @click.option(
     "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,

@@ -140,7 +140,7 @@ def test_package_is_stored_aligned_and_undated(tmp_path: Path) -> None:
     write_usd(asset(), path)
     data = path.read_bytes()
     with zipfile.ZipFile(path) as archive:
-        assert archive.namelist() == ["figure.usdc", "texture.png"]
+        assert archive.namelist() == ["figure.usdc", *(f"figure{lod}_texture.png" for lod in ("", "_lod1", "_lod2"))]
         for member in archive.infolist():
             header = data[member.header_offset : member.header_offset + 30]
             start = (
