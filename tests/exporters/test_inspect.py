@@ -48,12 +48,21 @@ def test_levels_of_detail_of_a_tileset(tmp_path: Path) -> None:
     assert [lod["geometric_error_m"] for lod in lods] == [mesh.deviation_m[1] for mesh in asset().lods]
 
 
+@pytest.mark.parametrize("name", ["a.usda", "a.usdc", "a.usdz"])
+def test_levels_of_detail_of_usd(tmp_path: Path, name: str) -> None:
+    write(asset(ZURICH), tmp_path / name)
+    lods = inspect(tmp_path / name)["lods"]
+    assert [lod["variant"] for lod in lods] == ["LOD0", "LOD1", "LOD2"]
+    assert [lod["triangles"] for lod in lods] == [len(mesh.faces) for mesh in asset().lods]
+    assert all(lod["solid"] and lod["texture_px"] == [64, 64] for lod in lods)
+
+
 @pytest.mark.parametrize("name", FACTS[:-1])
 def test_without_a_place_there_is_none(tmp_path: Path, name: str) -> None:
     write(asset(copyright="", metadata={}), tmp_path / name)
     facts = inspect(tmp_path / name)
     assert facts["placement"] is None
-    assert facts["lods"] is None
+    assert facts["lods"] is None or name.startswith("a.usd")
 
 
 def test_the_place_of_a_tileset_is_what_its_transform_does(tmp_path: Path) -> None:
