@@ -27,7 +27,7 @@ from exporters.gltf_document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
 from exporters.gltf_material import linear_rgba, material, texture_file
 from exporters.gltf_parts import features, manifold
 from exporters.ktx2 import padded
-from exporters.meshopt import quantised, quantised_normals, quantised_uv, reordered
+from exporters.meshopt import quantised, quantised_uv, reordered
 from exporters.profiles import GENERAL, Profile
 from exporters.solid import unit_normals
 
@@ -90,7 +90,7 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
     index_type = np.uint16 if len(mesh.vertices) <= 65535 else np.uint32
     corners = mesh.faces.reshape(-1).astype(index_type)
     indices = document.accessor("indices", corners, ELEMENT_ARRAY_BUFFER, "TRIANGLES")
-    attributes = _attributes(document, mesh, node, profile)
+    attributes = _attributes(document, mesh, node, asset.lit, profile)
     primitive: dict[str, Any] = {
         "attributes": attributes, "indices": indices, "material": material(document, mesh, asset.lit, profile),
         "mode": 4,
@@ -127,11 +127,15 @@ def _about(document: Document, asset: Asset, profile: Profile) -> dict[str, Any]
     return about | ({"extras": extras} if extras else {})
 
 
-def _attributes(document: Document, mesh: TexturedMesh, node: dict[str, Any], profile: Profile) -> dict[str, int]:
+def _attributes(
+    document: Document, mesh: TexturedMesh, node: dict[str, Any], lit: bool, profile: Profile
+) -> dict[str, int]:
     """Accessors of the vertices; quantised positions need a transform, which the node gets."""
     normals = mesh.normals
     if not profile.extensions and normals is None:
         normals = mesh.shading_normals  # the surface will be lit, and smooth only with these
+    elif profile.compressed and not lit:
+        normals = None  # nothing that reads this file would look at them
     attributes = {}
 
     def add(semantic: str, name: str, array: Any, **more: Any) -> None:
@@ -143,7 +147,7 @@ def _attributes(document: Document, mesh: TexturedMesh, node: dict[str, Any], pr
         node |= {"translation": list(positions.origin), "scale": [positions.scale] * 3}
         add("POSITION", "position", positions.steps, normalized=True, **_bounds(positions.steps))
         if normals is not None:
-            add("NORMAL", "normal", quantised_normals(unit_normals(normals)), normalized=True)
+            attributes["NORMAL"] = document.octahedral("normal", unit_normals(normals))
         if mesh.uv is not None:
             add("TEXCOORD_0", "texcoord", quantised_uv(mesh.uv), normalized=True)
     else:

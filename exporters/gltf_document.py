@@ -73,6 +73,14 @@ class Document:
             view = self._packed(name, rows, target, mode)
         return self.accessor_at(name, little, view, **more)
 
+    def octahedral(self, name: str, normals: NDArray[np.float32]) -> int:
+        """Append unit vectors (N, 3), with their compression's own filter, as an accessor of 16-bit integers."""
+        from exporters.meshopt import octahedral
+
+        rows = octahedral(normals)
+        view = self._packed(name, rows, ARRAY_BUFFER, "ATTRIBUTES", rows.shape[1], "OCTAHEDRAL")
+        return self.accessor_at(name, np.empty((len(rows), 3), np.int16), view, normalized=True)
+
     def accessor_at(self, name: str, array: NDArray[Any], view: int, **more: Any) -> int:
         """Append an accessor of the array that lies at the start of a bufferView."""
         columns = 1 if array.ndim == 1 else array.shape[1]
@@ -128,7 +136,9 @@ class Document:
         self.length += padding + len(data)
         return self.length - len(data)
 
-    def _packed(self, name: str, rows: NDArray[Any], target: int | None, mode: Mode, stride: int = 0) -> int:
+    def _packed(
+        self, name: str, rows: NDArray[Any], target: int | None, mode: Mode, stride: int = 0, filtered: str = ""
+    ) -> int:
         size = rows.shape[1] * rows.itemsize
         more = {"byteStride": stride} if stride else {}
         if not self.compressed:
@@ -143,7 +153,7 @@ class Document:
         self.fallback = offset + rows.nbytes
         packed = {
             "buffer": 0, "byteOffset": self._append(data), "byteLength": len(data), "byteStride": size,
-            "count": len(rows), "mode": mode,
+            "count": len(rows), "mode": mode, **({"filter": filtered} if filtered else {}),
         }  # fmt: skip
         view_item: dict[str, Any] = {
             "name": name, "buffer": 1, "byteOffset": offset, "byteLength": rows.nbytes, **more,

@@ -100,6 +100,12 @@ def quantised_uv(uv: FloatArray) -> NDArray[np.uint16]:
     return np.rint(uv.astype(np.float64) * FULL).astype(np.uint16)
 
 
-def quantised_normals(normals: FloatArray) -> NDArray[np.int16]:
-    """Unit vectors (V, 3) in 32767 steps: as precise as shading can tell, and of length 1 to 3e-5."""
-    return np.rint(normals.astype(np.float64) * 32767).astype(np.int16)
+NORMAL_BITS = 10
+"""Of each of the two numbers that a normal is stored as: 0.1 degrees, and of length 1 to 1e-4 when decoded."""
+
+
+def octahedral(normals: FloatArray) -> NDArray[np.uint8]:
+    """Unit vectors (V, 3) as rows (V, 8) of the filter OCTAHEDRAL."""
+    rows = np.zeros((len(normals), 4), np.float32)
+    rows[:, :3] = normals
+    return np.asarray(codec().encode_filter_oct(rows, 8, NORMAL_BITS), dtype=np.uint8)

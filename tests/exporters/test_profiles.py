@@ -193,7 +193,7 @@ def test_missing_tools_are_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     with pytest.raises(ExportError, match="there is no profile maya; choose from cesiumjs"):
         profile_named("maya")
     monkeypatch.setenv("PATH", str(tmp_path))  # no node
-    with pytest.raises(ExportError, match="KTX 2 needs Node.js and the npm package ktx2-encoder; npm install"):
+    with pytest.raises(ExportError, match=r"KTX 2 needs Node\.js and the npm package ktx2-encoder; npm install"):
         PROFILES["cesiumjs-ktx2"].check_tools()
     monkeypatch.setitem(sys.modules, "meshopt", None)
     with pytest.raises(ExportError, match=r"compression needs the package meshopt; pip install"):
