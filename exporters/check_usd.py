@@ -68,14 +68,14 @@ def variations(stage: Any) -> Iterator[str]:
 
 def check_usd(path: Path) -> list[Finding]:
     """Findings about a .usda, .usdc or .usdz file."""
+    findings = check_usdz(path) if path.suffix.lower() == ".usdz" and path.is_file() else []
     try:
         stage = open_stage(path)
     except ExportError as error:
-        return [Finding("error", "UNREADABLE", error.finding, path.name)]
+        return [Finding("error", "UNREADABLE", error.finding, path.name), *findings]
     from pxr import UsdGeom
 
     ours = is_ours(stage)
-    findings = check_usdz(path) if path.suffix.lower() == ".usdz" else []
     if UsdGeom.GetStageMetersPerUnit(stage) != 1.0 or UsdGeom.GetStageUpAxis(stage) != UsdGeom.Tokens.y:
         found = f"{UsdGeom.GetStageMetersPerUnit(stage):g} m a unit, {UsdGeom.GetStageUpAxis(stage)} up"
         message = f"the stage has {found}" + (", not metres and Y" if ours else "")

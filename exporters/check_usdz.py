@@ -23,7 +23,7 @@ def check_usdz(path: Path) -> list[Finding]:
             members = archive.infolist()
             broken = archive.testzip()
     except (zipfile.BadZipFile, OSError) as error:
-        return [Finding("error", "PACKAGE", f"no readable archive ({error})", path.name)]
+        return [Finding("error", "UNREADABLE", f"no readable archive ({error})", path.name)]
     findings = []
 
     def note(name: str, message: str) -> None:

@@ -103,10 +103,10 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         if solid is not None:
             item["extensions"] = {"EXT_mesh_manifold": solid}
     elif mesh.parts is not None:
-        # Of core glTF alone: a custom attribute with the labels, and what they mean on the node.
+        # Of core glTF alone: a custom attribute with the labels; what they mean is on the node.
         attributes["_PART"] = document.accessor("part", mesh.parts.astype(np.float32), ARRAY_BUFFER, "ATTRIBUTES")
-        labels = np.unique(mesh.parts).tolist()
-        node["extras"] = {"parts": {str(label): asset.part_names.get(label, f"part_{label}") for label in labels}}
+    if not profile.extensions:
+        node |= _node_extras(asset, mesh)
     document.add("meshes", item)
     return document, mesh.texture
 
@@ -125,6 +125,19 @@ def _about(document: Document, asset: Asset, profile: Profile) -> dict[str, Any]
         document.json["extensions"] = {xmp.EXTENSION: {"packets": [xmp.packet(asset)]}}
         about["extensions"] = {xmp.EXTENSION: {"packet": 0}}
     return about | ({"extras": extras} if extras else {})
+
+
+def _node_extras(asset: Asset, mesh: TexturedMesh) -> dict[str, Any]:
+    """Facts where clients without extensions look for them; Blender makes custom properties of them."""
+    extras: dict[str, Any] = {}
+    if mesh.parts is not None:
+        labels = np.unique(mesh.parts).tolist()
+        extras["parts"] = {str(label): asset.part_names.get(label, f"part_{label}") for label in labels}
+    if asset.placement is not None:
+        extras["georeference"] = georeference(asset.placement)
+    if asset.copyright:
+        extras["copyright"] = asset.copyright
+    return {"extras": extras} if extras else {}
 
 
 def _attributes(

@@ -155,7 +155,9 @@ def test_plain_profiles_are_core_gltf(tmp_path: Path, name: str) -> None:
     assert gltf.accessor(primitive["attributes"]["NORMAL"]) == pytest.approx(capsule().normals, abs=0.05)
     labels = gltf.accessor(primitive["attributes"]["_PART"])
     assert np.array_equal(labels, capsule().parts)
-    assert gltf.document["nodes"][0]["extras"] == {"parts": {"1": "torso", "2": "head", "9": "l_upper_leg"}}
+    extras = gltf.document["nodes"][0]["extras"]
+    assert extras["parts"] == {"1": "torso", "2": "head", "9": "l_upper_leg"}
+    assert extras["georeference"]["heading_deg"] == ZURICH.heading_deg
 
 
 def test_without_vertex_colours_their_mean_remains(tmp_path: Path) -> None:
