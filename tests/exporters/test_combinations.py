@@ -87,6 +87,7 @@ def test_all_pairs_are_there() -> None:
     assert len(COMBINATIONS) < len(every) / 100
 
 
+@pytest.mark.slow
 def test_validators_are_clean(
     tmp_path: Path, node: RunScript, codecs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:  # fmt: skip

@@ -82,7 +82,9 @@ def _same_triangles(mesh: TexturedMesh, gltf: Gltf, step: float) -> None:
     assert canonical(alias[nearest[faces]]) == canonical(alias[mesh.faces])
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if "uint32" in name else name for name in VARIANTS]
+)
 def test_compressed_files_come_back_within_half_a_step(tmp_path: Path, name: str, codec_tools: RunScript) -> None:
     given = VARIANTS[name]
     step = float(np.ptp(given.mesh.vertices, axis=0).max()) / 65535
@@ -167,7 +169,9 @@ def test_without_vertex_colours_their_mean_remains(tmp_path: Path) -> None:
     assert material["pbrMetallicRoughness"]["baseColorFactor"] == pytest.approx([1, 0.2159, 0, 1], abs=1e-4)
 
 
-@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if "ktx2" in name else name for name in PROFILES]
+)
 def test_same_bytes_in_another_process(tmp_path: Path, name: str, codec_tools: RunScript) -> None:
     suffix = ".usdc" if name == "omniverse" else ".glb"
     here = write(asset(ZURICH), tmp_path / f"a{suffix}", profile=PROFILES[name])[-1].read_bytes()
