@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from exporters.asset import Asset
-from exporters.write import check_outputs, is_tileset, write
+from exporters.write import check_outputs, in_order, is_tileset, needs_place, write
 from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
@@ -51,6 +51,7 @@ def run(
     texture_size: int | None,
     lods: int,
     visible_from: float,
+    tiles_version: Any,
     parts: str,
     textures: str | None,
     contours: str,
@@ -77,7 +78,7 @@ def run(
         raise InputError("--resume-from", f"{resume_from} is no stage", f"choose from {', '.join(STAGES)}")
     if resume_from is not None and save_stages is None:
         raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
-    _check_targets(targets, figure.stem, lods, placement, overwrite)
+    _check_targets(targets, figure.stem, lods, placement, overwrite, tiles_version)
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
@@ -118,10 +119,12 @@ def run(
             lit=settings.light,
             metadata={"source": figure.name, "seed": settings.seed, "quality": quality},
         )
-        for target in targets:
+        for target in in_order(targets):
             advance(f"write {target}")
             start = time.perf_counter()
-            written += write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
+            written += write(
+                asset, target, overwrite=overwrite, visible_from_m=visible_from, tiles_version=tiles_version
+            )
             timings.append(Timing(f"write {target}", time.perf_counter() - start, peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
@@ -215,12 +218,13 @@ def placement_for(
 
 
 def _check_targets(
-    targets: tuple[str, ...], name: str, lods: int, placement: GeoPlacement | None, overwrite: bool
+    targets: tuple[str, ...], name: str, lods: int, placement: GeoPlacement | None, overwrite: bool, version: Any
 ) -> None:
     for target in targets:
-        if placement is None and is_tileset(target):
-            raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT")
-    check_outputs(targets, overwrite=overwrite, name=name, lods=lods)
+        if placement is None and needs_place(target):
+            kind = "3D Tiles" if is_tileset(target) else Path(target).suffix
+            raise OutputError(target, f"{kind} need a place on earth", "pass --lonlat LON LAT")
+    check_outputs(targets, overwrite=overwrite, name=name, lods=lods, tiles_version=version)
 
 
 def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any) -> Plan:
