@@ -1,114 +1,120 @@
-"""A balanced tree over places on the earth, each node with a sphere round all that is below it.
+"""A balanced tree over places on the earth, each node with an oriented box round all that is below it.
 
 Sort-tile-recursive packing (Leutenegger, Lopez, Edgington 1997) on earth-centred coordinates: the figures of a node
 are cut at ranks, across their longest extent, until there are enough groups, all full. Poles and antimeridian are
 places like any other there, and no number of figures at one place makes the tree deeper.
+
+Boxes lie flat on the earth where they are: a sphere round figures 100 km apart would reach 50 km up, and a viewer at
+that height would visit all of it. As a box holds the corners of the boxes below, it holds the bulge of the earth.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from exporters.tiles import BOX_MARGIN_M
-from georef.geodesy import ecef_from_tile
+from georef.geodesy import ecef_from_tile, enu_at, geodetic_from_ecef
 
 BRANCHES = 8
 """Largest number of children of a node, and of figures of a leaf."""
 
-ROUNDING_M = 1e-3
-"""Spheres are written with centres and radii of whole millimetres, the radius rounded up."""
+DEEP_M = 1e6
+"""Where the mean of the figures is no farther from the earth's centre than this, no side of the box is up."""
 
 Floats = NDArray[np.float64]
-Sphere = tuple[float, float, float, float]
+
+SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+"""(8, 3): the corners of a box in half lengths of its axes."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceNode:
     """A node of the tree.
 
-    sphere : centre and radius, ECEF, metres; holds the spheres of all nodes and figures below
+    box : centre and three half axes, ECEF, metres, as 3D Tiles write them; holds all boxes of nodes and figures below
     count : how many figures are below
     depth : how many nodes lie on the longest way down, 1 for a leaf
     children : of an inner node, at least two; empty for a leaf
     figures : indices of a leaf's figures; empty for an inner node
     """
 
-    sphere: Sphere
+    box: tuple[float, ...]
     count: int
     depth: int
     children: tuple[PlaceNode, ...] = ()
     figures: tuple[int, ...] = ()
 
 
-def figure_sphere(placement: Any, low: Any, high: Any) -> Sphere:
-    """Sphere, in ECEF, round a figure's box with its margin; low, high : corners in the TILE frame, metres."""
-    centre = (np.asarray(low) + np.asarray(high)) / 2
-    half = (np.asarray(high) - np.asarray(low)) / 2 + 2 * BOX_MARGIN_M
-    x, y, z = ecef_from_tile(placement).apply(centre).tolist()
-    return (x, y, z, float(np.linalg.norm(half)))
+def figure_corners(placement: Any, low: ArrayLike, high: ArrayLike) -> Floats:
+    """(8, 3) corners, ECEF, of a figure's box with its margin; low, high : corners in the TILE frame, metres."""
+    bottom, top = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    local = (bottom + top) / 2 + SIGNS * ((top - bottom) / 2 + 2 * BOX_MARGIN_M)
+    return ecef_from_tile(placement).apply(local)
 
 
-def place_tree(spheres: Floats) -> PlaceNode:
+def place_tree(corners: Floats) -> PlaceNode:
     """The tree over figures.
 
-    spheres : (N, 4) float64, N >= 1, centres and radii in ECEF, metres; order matters only among equal coordinates
+    corners : (N, 8, 3) float64, N >= 1, ECEF, metres; order matters only among figures with equal centres
 
     Its depth is the least that nodes of 8 allow: ceil(log8 N), at least 1.
     """
-    spheres = np.asarray(spheres, dtype=np.float64)
-    return _node(np.arange(len(spheres)), spheres)
+    corners = np.asarray(corners, dtype=np.float64)
+    return _node(np.arange(len(corners)), corners, corners.mean(axis=1))
 
 
-def _node(indices: NDArray[np.int64], spheres: Floats) -> PlaceNode:
+def _node(indices: NDArray[np.int64], corners: Floats, centres: Floats) -> PlaceNode:
     count = len(indices)
     if count <= BRANCHES:
-        return PlaceNode(enclosing_sphere(spheres[indices]), count, 1, figures=tuple(indices.tolist()))
+        box = enclosing_box(corners[indices].reshape(-1, 3))
+        return PlaceNode(box, count, 1, figures=tuple(indices.tolist()))
     capacity = BRANCHES
     while capacity * BRANCHES < count:
         capacity *= BRANCHES
-    groups = _cut(indices, spheres, -(-count // capacity))
-    children = tuple(_node(group, spheres) for group in groups)
-    sphere = enclosing_sphere(np.array([child.sphere for child in children]))
-    return PlaceNode(sphere, count, 1 + max(child.depth for child in children), children)
+    groups = _cut(indices, centres, -(-count // capacity))
+    children = tuple(_node(group, corners, centres) for group in groups)
+    box = enclosing_box(np.concatenate([box_corners(child.box) for child in children]))
+    return PlaceNode(box, count, 1 + max(child.depth for child in children), children)
 
 
-def _cut(indices: NDArray[np.int64], spheres: Floats, groups: int) -> list[NDArray[np.int64]]:
+def _cut(indices: NDArray[np.int64], centres: Floats, groups: int) -> list[NDArray[np.int64]]:
     """That many groups of neighbours of nearly equal size."""
     if groups == 1:
         return [indices]
-    centres = spheres[indices, :3]
-    axis = int(np.argmax(np.ptp(centres, axis=0)))
-    order = indices[np.argsort(centres[:, axis], kind="stable")]
+    own = centres[indices]
+    axis = int(np.argmax(np.ptp(own, axis=0)))
+    order = indices[np.argsort(own[:, axis], kind="stable")]
     left = groups // 2
     # Rounded up, or the groups on the right could be one too large for what a node holds.
     place = -(-len(indices) * left // groups)
-    return _cut(order[:place], spheres, left) + _cut(order[place:], spheres, groups - left)
+    return _cut(order[:place], centres, left) + _cut(order[place:], centres, groups - left)
 
 
-def enclosing_sphere(spheres: Floats) -> Sphere:
-    """A sphere, close to the smallest, round spheres.
+def box_corners(box: ArrayLike) -> Floats:
+    """(8, 3) corners of a box of 3D Tiles, in its frame."""
+    values = np.asarray(box, dtype=np.float64)
+    return np.asarray(values[:3] + SIGNS @ values[3:].reshape(3, 3))
 
-    spheres : (N, 4) float64, N >= 1, centres and radii in metres
-    returns : centre and radius in whole millimetres, the radius rounded up
 
-    After Badoiu and Clarkson (2003): the centre moves towards the farthest sphere by ever shorter steps.
+def enclosing_box(points: Floats) -> tuple[float, ...]:
+    """A box round points, two of its axes level where the points are.
+
+    points : (N, 3) float64, N >= 1, ECEF, metres
+    returns : 12 numbers, centre (whole millimetres) and half axes east, north and up, each at least 1 mm longer than
+        needed: float64 at the size of the earth is good to 1e-9 m
     """
-    centres, radii = spheres[:, :3], spheres[:, 3]
-    centre = (centres.min(axis=0) + centres.max(axis=0)) / 2
-    best, least = centre, np.inf
-    for step in range(24):
-        reach = np.linalg.norm(centres - centre, axis=1) + radii
-        far = int(reach.argmax())
-        if reach[far] < least:
-            best, least = centre, float(reach[far])
-        centre = centre + (centres[far] - centre) / (step + 2)
-    rounded = np.round(best, 3) + 0.0
-    reach = np.linalg.norm(centres - rounded, axis=1) + radii
-    # One millimetre more than needed: float64 at the size of the earth is good to 1e-9 m, sums of such are too.
-    radius = np.ceil(float(reach.max()) / ROUNDING_M + 1) * ROUNDING_M
-    x, y, z = rounded.tolist()
-    return (x, y, z, round(float(radius), 3))
+    mean = points.mean(axis=0)
+    axes = np.eye(3)
+    if np.linalg.norm(mean) > DEEP_M:
+        lon, lat, _ = geodetic_from_ecef(mean).tolist()
+        axes = enu_at(lon, lat).matrix[:3, :3]
+    local = (points - mean) @ axes
+    middle = (local.min(axis=0) + local.max(axis=0)) / 2
+    centre = np.round(mean + axes @ middle, 3)
+    half = np.ceil(np.abs((points - centre) @ axes).max(axis=0) * 1e3 + 1) / 1e3
+    return tuple((np.concatenate([centre, (axes * half).T.ravel()]) + 0.0).tolist())

@@ -2,11 +2,11 @@
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html
 
-Inner tiles have no content, only a sphere in ECEF round everything below. All of them have the geometric error of the
+Inner tiles have no content, only a box in ECEF round everything below. All of them have the geometric error of the
 whole tileset, whose range is the distance that figures are drawn from, and refine by ADD: then CesiumJS tests each
 child's own distance against the error of its parent, so a figure is drawn from just as far as if it had a tileset of
 its own, and what lies farther away is neither visited nor loaded. Larger errors higher up would gain nothing, since a
-sphere is never farther away than what it holds.
+box is never farther away than what it holds.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from exporters.place_tree import PlaceNode, figure_sphere, place_tree
+from exporters.place_tree import PlaceNode, figure_corners, place_tree
 from exporters.placed_figure import PlacedFigure
 from exporters.tiles import TilesVersion, check_distance, figure_tile, visible_error
 
@@ -113,7 +113,7 @@ class _Writer:
         numbers: Iterator[int],
     ) -> dict[str, Any]:
         tile: dict[str, Any] = {
-            "boundingVolume": {"sphere": list(node.sphere)}, "geometricError": self.error, "refine": "ADD",
+            "boundingVolume": {"box": list(node.box)}, "geometricError": self.error, "refine": "ADD",
         }  # fmt: skip
         if node is not top and node.count <= limit < top.count:
             file = f"{self.stem}_{next(numbers):0{self.digits}d}.json"
@@ -148,8 +148,7 @@ def tileset_documents(
     Raises ExportError for a distance that is not positive.
     """
     check_distance(visible_from_m)
-    spheres = np.array([figure_sphere(each.placement, each.low, each.high) for each in figures])
-    tree = place_tree(spheres)
+    tree = place_tree(np.array([figure_corners(each.placement, each.low, each.high) for each in figures]))
     error = visible_error(visible_from_m, max(figure.errors[-1] for figure in figures))
     files = -(-len(figures) // FIGURES_PER_FILE)
     writer = _Writer(figures, error, version, PurePosixPath(name).stem, len(str(2 * files)))
