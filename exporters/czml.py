@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 
 from exporters.asset import Asset
 from exporters.glb import write_glb
-from exporters.placed_figure import PlacedFigure, figure_of
-from georef.geodesy import ecef_from_asset
+from exporters.placed_figure import PlacedFigure, ecef_matrix, figure_of
 from georef.placement import GeoPlacement
 
 
@@ -60,7 +59,8 @@ def entity_quaternion(place: GeoPlacement) -> list[float]:
 
     CesiumJS turns a model's front, +Z of glTF, to the entity's +x, its +X to +y and its up to +z.
     """
-    return quaternion(ecef_from_asset(place).matrix[:3, [2, 0, 1]])
+    left, back, up = ecef_matrix(place)[:3, :3].T
+    return quaternion(np.stack([-back, left, up], axis=1))
 
 
 def quaternion(rotation: NDArray[np.float64]) -> list[float]:

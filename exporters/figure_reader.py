@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,13 +18,16 @@ from exporters.errors import ExportError
 from exporters.georeference import placement_of_record
 from exporters.glb_container import open_glb
 from exporters.gltf_reader import Gltf
-from exporters.placed_figure import PlacedFigure, area_mean, monotone_errors, vector
-from georef.geodesy import ecef_from_tile, tile_from_asset
+from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
+from georef.geodesy import tile_from_asset
 
 SAME_PLACE_M = 1e-3
 """A tile's transform and the place recorded in its content may differ by this much: the project's promise."""
 
 INTEGER_SCALES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
+
+PICKS = np.array(list(itertools.product((0, 1), repeat=3)))
+"""(8, 3): for each corner of a box, which of its two ends along each axis."""
 
 Box = NDArray[np.float64]
 
@@ -73,7 +78,7 @@ def read_figure(path: Path) -> PlacedFigure:
             placement=placement,
             low=vector(low),
             high=vector(high),
-            contents=(str(path.resolve()),),
+            contents=(os.path.abspath(path),),
             errors=(0.0,),
             source=str(metadata.get("source", "")),
             copyright=str(asset.get("copyright", "")),
@@ -99,12 +104,10 @@ def _bounds(gltf: Gltf) -> tuple[Box, Box]:
             ends = np.array([accessor["min"], accessor["max"]], dtype=np.float64)
             if accessor.get("normalized"):
                 ends = np.maximum(ends / INTEGER_SCALES[accessor["componentType"]], -1.0)
-            picks = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
-            box = np.stack([ends[picks[:, axis], axis] for axis in range(3)], axis=1)
-            corners.append(tile_from_asset().apply(box @ matrix[:3, :3].T + matrix[:3, 3]))
+            corners.append(ends[PICKS, [0, 1, 2]] @ matrix[:3, :3].T + matrix[:3, 3])
     if not corners:
         raise ValueError("no mesh in its scene")
-    points = np.concatenate(corners)
+    points = tile_from_asset().apply(np.concatenate(corners))
     if not np.isfinite(points).all():
         raise ValueError("vertices that are not finite")
     return points.min(axis=0), points.max(axis=0)
@@ -161,7 +164,7 @@ def _figure_of_tiles(tile: dict[str, Any], path: Path) -> PlacedFigure:
     records = [read_figure(file) for file, _ in reversed(levels)]
     finest = records[0]
     matrix = np.asarray(tile["transform"], dtype=np.float64).reshape(4, 4).T
-    away = float(np.linalg.norm(ecef_from_tile(finest.placement).matrix[:3, 3] - matrix[:3, 3]))
+    away = float(np.linalg.norm(ecef_matrix(finest.placement)[:3, 3] - matrix[:3, 3]))
     if away > SAME_PLACE_M:
         raise ExportError(
             path, f"puts {levels[-1][0].name} {away:.3g} m from the place recorded in it", "write it anew"

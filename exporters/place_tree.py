@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from exporters.placed_figure import ecef_matrix
 from exporters.tiles import BOX_MARGIN_M
-from georef.geodesy import ecef_from_tile, enu_at, geodetic_from_ecef
+from georef.geodesy import enu_at, geodetic_from_ecef
+from georef.placement import GeoPlacement
 
 BRANCHES = 8
 """Largest number of children of a node, and of figures of a leaf."""
@@ -50,11 +51,12 @@ class PlaceNode:
     figures: tuple[int, ...] = ()
 
 
-def figure_corners(placement: Any, low: ArrayLike, high: ArrayLike) -> Floats:
+def figure_corners(placement: GeoPlacement, low: ArrayLike, high: ArrayLike) -> Floats:
     """(8, 3) corners, ECEF, of a figure's box with its margin; low, high : corners in the TILE frame, metres."""
     bottom, top = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     local = (bottom + top) / 2 + SIGNS * ((top - bottom) / 2 + 2 * BOX_MARGIN_M)
-    return ecef_from_tile(placement).apply(local)
+    matrix = ecef_matrix(placement)
+    return np.asarray(local @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def place_tree(corners: Floats) -> PlaceNode:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from exporters.asset import Asset
 from exporters.errors import ExportError
 from exporters.sampling import face_parts, observed_shares
-from georef.geodesy import tile_from_asset
+from georef.geodesy import ecef_from_tile, tile_from_asset
 from georef.placement import GeoPlacement
 
 Vector = tuple[float, float, float]
@@ -89,9 +90,16 @@ def _mean_share(shares: dict[int, float], faces: NDArray[Any], corners: NDArray[
 
 def area_mean(values: NDArray[np.float64], corners: NDArray[np.float64]) -> float:
     """Mean of (F,) values of triangles by their area, rounded to 4 digits; corners : (F, 3, 3) any unit."""
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    (ax, ay, az), (bx, by, bz) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    area = np.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)
     total = float(area.sum())
     return round(float(area @ values) / total, 4) if total else 0.0
+
+
+@functools.lru_cache(maxsize=1 << 17)
+def ecef_matrix(placement: GeoPlacement) -> NDArray[np.float64]:
+    """(4, 4) ECEF from TILE, read-only; kept, as box, transform and orientation of 100,000 figures need it each."""
+    return ecef_from_tile(placement).matrix
 
 
 def vector(values: NDArray[np.float64]) -> Vector:

@@ -25,9 +25,7 @@ from exporters.b3dm import b3dm_bytes
 from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.glb import glb_bytes
-from exporters.placed_figure import PlacedFigure, figure_of
-from georef.geodesy import ecef_from_tile
-from georef.transform import column_major
+from exporters.placed_figure import PlacedFigure, ecef_matrix, figure_of
 
 TilesVersion = Literal["1.0", "1.1"]
 
@@ -155,4 +153,6 @@ def figure_tile(figure: PlacedFigure, facts: dict[str, Any] | None = None) -> di
         children = {"children": [tile]} if tile else {}
         content = {"content": {"uri": quote(uri)}}
         tile = {"boundingVolume": volume, "geometricError": error, **(facts or {}), **content, **children}
-    return {"transform": column_major(ecef_from_tile(figure.placement)), "refine": "REPLACE", **tile}
+    # Column by column; adding zero turns -0.0 into 0.0, as the same place must not be written in two ways.
+    transform = (ecef_matrix(figure.placement).T.ravel() + 0.0).tolist()
+    return {"transform": transform, "refine": "REPLACE", **tile}
