@@ -67,9 +67,8 @@ def _geojson(item: Any, path: Path, where: str) -> Iterator[Finding]:
         if "geometry" not in item or not isinstance(item.get("properties", 0), dict | None):
             yield Finding("error", "FEATURE", "a Feature needs geometry and properties, or null for them", where)
             return
-        if item["geometry"] is not None:
-            yield from _geojson(item["geometry"], path, where)
-        yield from _model_of_feature(item, path, where)
+        found = [] if item["geometry"] is None else list(_geojson(item["geometry"], path, where))
+        yield from found or _model_of_feature(item, path, where)
     elif kind == "GeometryCollection":
         for each in item.get("geometries", []):
             yield from _geojson(each, path, where)
@@ -173,8 +172,9 @@ def _packet(packet: dict[str, Any], path: Path, where: str) -> Iterator[Finding]
         yield Finding("error", "COORDINATES", "cartographicDegrees are no numbers", where)
         return
     fixed: list[float] = position if position is not None and len(position) == 3 else []
-    if fixed:
-        yield from _range(fixed, where)
+    if problems := list(_range(fixed, where)) if fixed else []:
+        yield from problems
+        return
     turned = packet.get("orientation", {}).get("unitQuaternion")
     if turned is not None and not isinstance(turned, list):
         yield Finding("error", "ORIENTATION", "unitQuaternion is no list", where)
