@@ -222,8 +222,8 @@ def _check_targets(
 ) -> None:
     for target in targets:
         if placement is None and needs_place(target):
-            kind = "3D Tiles" if is_tileset(target) else Path(target).suffix
-            raise OutputError(target, f"{kind} need a place on earth", "pass --lonlat LON LAT")
+            kind = "3D Tiles need" if is_tileset(target) else f"{Path(target).suffix} needs"
+            raise OutputError(target, f"{kind} a place on earth", "pass --lonlat LON LAT")
     check_outputs(targets, overwrite=overwrite, name=name, lods=lods, tiles_version=version)
 
 
