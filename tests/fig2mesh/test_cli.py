@@ -138,3 +138,10 @@ def test_stage_names_of_the_help_are_the_pipelines() -> None:
     from fig2mesh.pipeline import steps
 
     assert [step.name for step in steps(PRESETS["draft"], 1.79)] == list(STAGES)
+
+
+@pytest.mark.parametrize("name", ["a.czml", "a.geojson"])
+def test_places_need_a_place(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert main(["figure.png", "-o", str(tmp_path / name)]) == 2
+    suffix = Path(name).suffix
+    assert f"{suffix} needs a place on earth; pass --lonlat LON LAT" in capsys.readouterr().err
