@@ -16,6 +16,7 @@ from exporters.errors import ExportError
 from exporters.facts import file_sizes, solid_facts, texture_size
 from exporters.georeference import placement_of_tile
 from exporters.gltf_reader import Gltf, read_gltf
+from exporters.inspect_places import collection_facts, places_facts
 from exporters.inspect_usd import usd_facts
 from exporters.solid import merged_by_position
 from exporters.validate import read_triangles
@@ -52,7 +53,10 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _inspect_any(path: Path) -> dict[str, Any]:
     suffix = path.suffix.lower()
     if path.is_dir() or suffix == ".json":
-        return _inspect_tileset(path / "tileset.json" if path.is_dir() else path)
+        tileset = path / "tileset.json" if path.is_dir() else path
+        return collection_facts(tileset) or _inspect_tileset(tileset)
+    if suffix in (".czml", ".geojson"):
+        return places_facts(path, _inspect_gltf)
     if suffix in (".glb", ".gltf"):
         return _inspect_gltf(path)
     if suffix in (".usda", ".usdc", ".usdz"):

@@ -78,15 +78,18 @@ class Profile:
 
 GENERAL = Profile()
 
+_CESIUMJS = (".glb", ".gltf", ".czml", ".geojson", TILES)
 _USD = (".usda", ".usdc", ".usdz")
 
 PROFILES = {
     profile.name: profile
     for profile in (
-        Profile("cesiumjs", "CesiumJS", (".glb", ".gltf", TILES), compressed=True, texture="webp"),
-        Profile("cesiumjs-ktx2", "CesiumJS", (".glb", ".gltf", TILES), compressed=True, texture="ktx2"),
+        Profile("cesiumjs", "CesiumJS", (".glb", ".gltf", ".czml", ".geojson", TILES), compressed=True, texture="webp"),
+        Profile(
+            "cesiumjs-ktx2", "CesiumJS", (".glb", ".gltf", ".czml", ".geojson", TILES), compressed=True, texture="ktx2"
+        ),
         Profile("blender", "Blender", (".glb", ".gltf", *_USD, ".ply", ".obj"), extensions=False),
-        Profile("qgis", "QGIS", (".glb", ".gltf", ".obj", TILES), extensions=False, vertex_colors=False),
+        Profile("qgis", "QGIS", (".glb", ".gltf", ".obj", ".geojson", TILES), extensions=False, vertex_colors=False),
         Profile("omniverse", "Omniverse", (".usdc", ".usdz", TILES)),
     )
 }

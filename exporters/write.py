@@ -10,17 +10,19 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from exporters.asset import Asset
+from exporters.czml import write_czml
 from exporters.errors import ExportError
-from exporters.glb import glb_bytes, write_glb, write_gltf
+from exporters.geojson import write_geojson
+from exporters.glb import write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
 from exporters.profiles import GENERAL, Profile, suffix_of
-from exporters.tiles import DEFAULT_VISIBLE_FROM_M, content_name, write_tileset
+from exporters.tiles import DEFAULT_VISIBLE_FROM_M, TilesVersion, content_name, write_tileset
 from exporters.usd import texture_name, write_usd
 
 OutputPath = str | os.PathLike[str]
@@ -34,11 +36,13 @@ class Format:
     writer : writes an asset to a path for the client of a profile
     beside : endings, after the stem, of the files written next to the one asked for; the textures of USD, one for
         each level of detail, are not among them
+    placed : whether it says nothing without a place on the earth
     """
 
     title: str
     writer: Callable[[Asset, Path, Profile], None]
     beside: tuple[str, ...] = ()
+    placed: bool = False
 
 
 TEXTURE = "_texture.png"
@@ -57,6 +61,8 @@ FORMATS: dict[str, Format] = {
     ".usdz": Format("OpenUSD package", _same_for_all(write_usd)),
     ".ply": Format("Stanford PLY", _same_for_all(write_ply)),
     ".obj": Format("Wavefront OBJ", _same_for_all(write_obj), (".mtl", TEXTURE)),
+    ".czml": Format("CZML", write_czml, (".glb",), placed=True),
+    ".geojson": Format("GeoJSON", write_geojson, (".glb",), placed=True),
 }
 """File formats by suffix; a folder or a tileset.json means 3D Tiles."""
 
@@ -74,18 +80,29 @@ def has_levels(path: OutputPath) -> bool:
     return is_tileset(path) or Path(path).suffix.lower().startswith(".usd")
 
 
+def needs_place(path: OutputPath) -> bool:
+    """Whether an output cannot be written without a place on the earth: 3D Tiles, CZML, GeoJSON."""
+    return is_tileset(path) or getattr(FORMATS.get(Path(path).suffix.lower()), "placed", False)
+
+
+def in_order(paths: Iterable[OutputPath]) -> list[OutputPath]:
+    """The outputs of one asset in the order to write them: models before the files that have them beside."""
+    return sorted(paths, key=lambda path: FORMATS.get(Path(path).suffix.lower(), FORMATS[".glb"]).placed)
+
+
 def check_outputs(
     paths: Iterable[OutputPath],
     overwrite: bool = False,
     name: str = "",
     lods: int = 1,
+    tiles_version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
 ) -> None:
     """Find out before the work begins what would keep outputs from being written.
 
     paths : all outputs of one asset
     overwrite : existing files may be replaced
-    name, lods : of the asset to come, from which the files beside a tileset.json get their names
+    name, lods, tiles_version : of the asset to come, from which the files beside a tileset.json get their names
     profile : of the client that is to read them
 
     Raises ExportError naming the first output with an unknown suffix, that the client does not read, in a folder that
@@ -97,7 +114,7 @@ def check_outputs(
         main = _main_file(path)
         profile.check(os.fspath(path), suffix_of(main))
         check_file(path, main, overwrite)
-        for companion in _companions(path, name, lods, profile):
+        for companion in _companions(path, name, lods, tiles_version, profile):
             if companion.exists() and not overwrite:
                 raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
             parts[os.path.abspath(companion)] = main
@@ -106,6 +123,8 @@ def check_outputs(
             raise ExportError(os.fspath(path), "is asked for twice", "name each output once")
         seen.add(key)
     for key in seen & set(parts):
+        if parts[key].suffix.lower() in (".czml", ".geojson"):
+            continue  # the model beside them is the one that is asked for
         raise ExportError(key, f"is also a part of {parts[key]}", "choose another name or folder for one of them")
 
 
@@ -114,6 +133,7 @@ def write(
     path: OutputPath,
     overwrite: bool = False,
     visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    tiles_version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
 ) -> tuple[Path, ...]:
     """Write an asset in the format that the path names, whole or not at all.
@@ -121,7 +141,7 @@ def write(
     asset : not changed
     path : a file with a suffix of `FORMATS`; a folder or its tileset.json for 3D Tiles. Missing folders are made
     overwrite : replace what is there; in the folder of a tileset only files of the names we write
-    visible_from_m : for 3D Tiles, see `exporters.tiles.write_tileset`
+    visible_from_m, tiles_version : for 3D Tiles, see `exporters.tiles.write_tileset`
     profile : what the client of the file takes
     returns : the files written, the one that names the others last
 
@@ -133,22 +153,26 @@ def write(
     check_file(path, main, overwrite)
 
     def fill(stage: Path) -> None:
-        if main.name != "tileset.json":
+        if main.name == "tileset.json":
+            write_tileset(asset, stage, visible_from_m, tiles_version, profile)
+        else:
             FORMATS[main.suffix.lower()].writer(asset, stage / main.name, profile)
-            return
-        write_tileset(asset, stage, visible_from_m)
-        if profile != GENERAL:
-            for lod in range(len(asset.lods)):
-                (stage / content_name(asset.name, lod)).write_bytes(glb_bytes(asset, lod, profile))
 
     return write_whole(path, main, fill, overwrite)
 
 
-def write_whole(path: OutputPath, main: Path, fill: Callable[[Path], None], overwrite: bool) -> tuple[Path, ...]:
+def write_whole(
+    path: OutputPath,
+    main: Path,
+    fill: Callable[[Path], None],
+    overwrite: bool,
+    outdated: Iterable[str] = (),
+) -> tuple[Path, ...]:
     """Put the files that `fill` makes in a folder beside `main`, all of them or none; `main` comes last.
 
     path : the output as it was asked for, for messages
-    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others
+    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others, folders too
+    outdated : files beside `main`, slashes between folders, that go where `fill` makes none of their name
     returns : the files written
 
     Raises ExportError where the disk refuses, or a file is there already although `overwrite` is off.
@@ -156,8 +180,9 @@ def write_whole(path: OutputPath, main: Path, fill: Callable[[Path], None], over
     try:
         with _folders(main.parent), _staging(main.parent) as stage:
             fill(stage)
-            names = sorted(file.name for file in stage.iterdir() if file.name != main.name) + [main.name]
-            _put_in_place(stage, main.parent, names, overwrite)
+            files = (file.relative_to(stage).as_posix() for file in stage.rglob("*") if file.is_file())
+            names = sorted(name for name in files if name != main.name) + [main.name]
+            _put_in_place(stage, main.parent, names, overwrite, sorted(set(outdated) - set(names)))
     except OSError as error:
         reason = error.strerror or str(error)
         raise ExportError(os.fspath(path), f"cannot be written ({reason})", "choose another folder") from error
@@ -175,9 +200,9 @@ def _main_file(path: OutputPath) -> Path:
     return file
 
 
-def _companions(path: OutputPath, name: str, lods: int, profile: Profile) -> list[Path]:
+def _companions(path: OutputPath, name: str, lods: int, version: TilesVersion, profile: Profile) -> list[Path]:
     if is_tileset(path):
-        return [_main_file(path).with_name(content_name(name, lod)) for lod in range(lods)] if name else []
+        return [_main_file(path).with_name(content_name(name, lod, version)) for lod in range(lods)] if name else []
     file = Path(path)
     if file.suffix.lower() in (".usda", ".usdc"):
         return [file.with_name(texture_name(file.stem, lod)) for lod in range(lods)]
@@ -233,26 +258,46 @@ def _staging(folder: Path) -> Iterator[Path]:
         shutil.rmtree(stage, ignore_errors=True)
 
 
-def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool) -> None:
+def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool, outdated: list[str]) -> None:
     """Rename staged files into their folder in this order, or leave the folder as it was."""
-    backup = stage / "replaced"
-    backup.mkdir()
-    kept, new = [], []
+    # Hidden, so that it is no folder of an output.
+    backup = stage / ".replaced"
+    kept, new, made = [], [], []
     try:
         for name in names:
             target = folder / name
+            for parent in reversed(Path(name).parents):
+                if not (folder / parent).exists():
+                    (folder / parent).mkdir()
+                    made.append(folder / parent)
             if target.exists():
                 if not overwrite and target.read_bytes() != (stage / name).read_bytes():
                     # Equal bytes are no conflict: .gltf and .obj of one figure share their texture.
                     raise ExportError(target, "exists already", "use --overwrite or choose another name")
-                shutil.copy2(target, backup / name)
+                _keep(target, backup / name)
                 kept.append(name)
             else:
                 new.append(name)
             os.replace(stage / name, target)
+        for name in outdated:
+            if (folder / name).is_file():
+                _keep(folder / name, backup / name)
+                kept.append(name)
+                (folder / name).unlink()
     except BaseException:
         for name in kept:
             os.replace(backup / name, folder / name)
         for name in new:
             (folder / name).unlink(missing_ok=True)
+        for each in reversed(made):
+            with suppress(OSError):
+                each.rmdir()
         raise
+
+
+def _keep(file: Path, copy: Path) -> None:
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, copy)
+    except OSError:  # file systems without hard links
+        shutil.copy2(file, copy)

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__, render_cli, view_cli
+from fig2mesh import __version__, render_cli, tileset_cli, view_cli
 from fig2mesh.figure_options import FILE, figure_files, messages
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
@@ -77,7 +77,7 @@ def cli() -> None:
 )  # fmt: skip
 @click.option(
     "-o", "--output", "outputs", multiple=True, metavar="OUT",
-    help=".glb .gltf .usda .usdc .usdz .ply .obj, or a folder / tileset.json for 3D Tiles; repeatable. "
+    help=".glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson, or a folder / tileset.json for 3D Tiles; repeatable. "
     "Default: FIGURE's stem + .glb in the current folder.",
 )  # fmt: skip
 @click.option(
@@ -93,6 +93,10 @@ def cli() -> None:
     "--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles, USD)."
 )
 @click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
+@click.option(
+    "--tiles-version", type=tileset_cli.TILES_VERSION, default="1.1", show_default=True,
+    help="Of 3D Tiles; 1.0: content as .b3dm, for older clients.",
+)  # fmt: skip
 @click.option(
     "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
     help="What depths come from: networks, or rules and the outline alone.",
@@ -200,6 +204,7 @@ def doctor() -> None:
 
 render_cli.add_to(cli)
 view_cli.add_to(cli)
+tileset_cli.add_to(cli)
 data_cli.add_to(cli)
 training_cli.add_to(cli)
 cli.add_command(tradeoff)

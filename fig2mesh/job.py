@@ -17,7 +17,7 @@ from typing import Any
 from exporters.asset import Asset, TexturedMesh
 from exporters.profiles import Profile, profile_named
 from exporters.sampling import observed_share
-from exporters.write import check_outputs, has_levels, is_tileset, write
+from exporters.write import check_outputs, has_levels, in_order, is_tileset, needs_place, write
 from fig2mesh import __version__
 from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
@@ -55,6 +55,7 @@ def run(
     texture_size: int | None,
     lods: int,
     visible_from: float,
+    tiles_version: Any,
     parts: str,
     textures: str | None,
     contours: str,
@@ -83,7 +84,7 @@ def run(
         raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
     client = profile_named(profile)
     client.check_tools()
-    _check_targets(targets, figure.stem, lods, placement, overwrite, client)
+    _check_targets(targets, figure.stem, lods, placement, overwrite, tiles_version, client)
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
@@ -124,10 +125,13 @@ def run(
             lit=settings.light,
             metadata=_metadata(figure, settings.seed, quality, levels[0]),
         )
-        for target in targets:
+        for target in in_order(targets):
             advance(f"write {target}")
             start = time.perf_counter()
-            written += write(asset, target, overwrite=overwrite, visible_from_m=visible_from, profile=client)
+            written += write(
+                asset, target, overwrite=overwrite, visible_from_m=visible_from, tiles_version=tiles_version,
+                profile=client,
+            )  # fmt: skip
             timings.append(Timing(f"write {target}", time.perf_counter() - start, peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
@@ -226,12 +230,14 @@ def _check_targets(
     lods: int,
     placement: GeoPlacement | None,
     overwrite: bool,
+    version: Any,
     client: Profile,
 ) -> None:
     for target in targets:
-        if placement is None and is_tileset(target):
-            raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT")
-    check_outputs(targets, overwrite=overwrite, name=name, lods=lods, profile=client)
+        if placement is None and needs_place(target):
+            kind = "3D Tiles need" if is_tileset(target) else f"{Path(target).suffix} needs"
+            raise OutputError(target, f"{kind} a place on earth", "pass --lonlat LON LAT")
+    check_outputs(targets, overwrite=overwrite, name=name, lods=lods, tiles_version=version, profile=client)
 
 
 def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any) -> Plan:

@@ -188,7 +188,7 @@ def test_regions_and_spheres_that_hold_the_figure_pass(tmp_path: Path) -> None:
     write(SMALL, tmp_path)
     document = json.loads((tmp_path / "tileset.json").read_text())
     lon, lat, metre = np.radians(8.5417), np.radians(47.3769), 1 / 6.3e6
-    region = [lon - 2 * metre, lat - metre, lon + 2 * metre, lat + metre, 455.3, 457.2]
+    region = [lon - 2 * metre, lat - metre, lon + 2 * metre, lat + metre, 455.2, 457.3]
     document["root"]["boundingVolume"] = {"region": region}
     document["root"]["children"][0]["boundingVolume"] = {"sphere": [0, 0, 0.9, 1.0]}
     (tmp_path / "tileset.json").write_text(json.dumps(document))

@@ -161,3 +161,10 @@ def test_a_missing_encoder_is_said_before_the_work(
         'fig2mesh: --profile: compression needs the package meshopt; pip install "fig2mesh[compression]"'
     )  # fmt: skip
     assert not (tmp_path / "a.glb").exists()
+
+
+@pytest.mark.parametrize("name", ["a.czml", "a.geojson"])
+def test_places_need_a_place(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert main(["figure.png", "-o", str(tmp_path / name)]) == 2
+    suffix = Path(name).suffix
+    assert f"{suffix} needs a place on earth; pass --lonlat LON LAT" in capsys.readouterr().err
