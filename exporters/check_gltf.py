@@ -1,122 +1,161 @@
 """Checks of glTF files: structure and our own promises in Python, the full rules by the Khronos validator.
 
-https://github.com/KhronosGroup/glTF-Validator
+Files from elsewhere promise less: what glTF does not demand of them (a closed solid, textures that do not repeat) is
+worth an info, not an error.
+
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 from __future__ import annotations
 
 import io
-import json
-import os
-import shutil
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from exporters.check_khronos import khronos_findings
 from exporters.errors import ExportError
-from exporters.findings import Finding, Severity, check_solid
-from exporters.gltf_reader import Gltf, read_gltf
+from exporters.findings import Finding, as_infos, check_place, check_solid
+from exporters.gltf_reader import MESHOPT, Gltf, NotReadHere, read_gltf
+from exporters.ktx2 import size_of
 
 UNIT_TOLERANCE = 5e-4
 """How far a normal's length may be from 1; the Khronos validator allows about as much."""
 
-KHRONOS_SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info", "info")  # the fourth are hints
+BYTE_UNIT_TOLERANCE = 2e-2
+"""The same for normals of 8 bits: half a step of each of three components."""
 
-KHRONOS_BLIND_SPOTS = ("UNSUPPORTED_EXTENSION", "UNUSED_OBJECT")
-"""Infos that only say that it does not know the extensions which we check here, nor what they refer to."""
+NOT_HERE = "NOT_READ_HERE"
+"""Code of the infos about what is not decoded here."""
 
-_KHRONOS_SCRIPT = """
-const fs = require('fs'), path = require('path'), file = process.argv[2];
-require(process.argv[1]).validateBytes(new Uint8Array(fs.readFileSync(file)), {
-  uri: path.basename(file), maxIssues: 100,
-  externalResourceFunction: (uri) => fs.promises.readFile(
-    path.join(path.dirname(file), decodeURIComponent(uri))).then((data) => new Uint8Array(data)),
-}).then((report) => console.log(JSON.stringify(report)));
-"""
+CODECS = {
+    *MESHOPT, "KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_basisu", "KHR_texture_transform",
+    "EXT_texture_webp", "EXT_texture_avif",
+}  # fmt: skip
+"""Extensions that a file has to require, as its data cannot be read without them; common clients know them."""
 
 
 def check_gltf(path: Path, external: bool = True) -> list[Finding]:
     """Findings about a .glb or .gltf file.
 
-    external : run the Khronos validator too where it is found, see `find_khronos_validator`
+    external : run the Khronos validator too where it is found, see `exporters.check_khronos`
     """
     try:
         gltf = read_gltf(path)
     except ExportError as error:
         return [Finding("error", "UNREADABLE", error.finding, path.name)]
-    findings = list(_check_document(gltf))
+    ours = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
+    findings = list(_check_document(gltf, ours))
     for index, mesh in enumerate(gltf.items("meshes")):
         where = f"{path.name}: meshes/{index}"
         try:
             for number, primitive in enumerate(mesh["primitives"]):
-                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}")
+                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", ours)
             findings += _check_manifold(gltf, index, where)
-            findings += check_solid(*gltf.solid_arrays(index), where)
+            solid = check_solid(*gltf.solid_arrays(index), where)
+            findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
+        except NotReadHere as reason:
+            findings.append(Finding("info", NOT_HERE, str(reason), where))
         except (ValueError, LookupError, TypeError) as error:
             findings.append(Finding("error", "UNREADABLE_MESH", str(error), where))
-    return findings + (khronos_findings(path) if external else [])
+    if not external:
+        return findings
+    images = enumerate(gltf.items("images"))
+    ktx2 = frozenset(f"/images/{index}" for index, image in images if image.get("mimeType") == "image/ktx2")
+    return findings + khronos_findings(path, ktx2)
 
 
-def _check_document(gltf: Gltf) -> Iterator[Finding]:
+def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
     name = gltf.path.name
-    version = gltf.document.get("asset", {}).get("version")
-    if version != "2.0":
-        yield Finding("error", "VERSION", f"asset.version is {version}, expected 2.0", f"{name}: asset")
+    about = gltf.document.get("asset", {})
+    if about.get("version") != "2.0":
+        yield Finding("error", "VERSION", f"asset.version is {about.get('version')}, expected 2.0", f"{name}: asset")
     if not gltf.items("meshes"):
-        yield Finding("error", "NO_MESH", "no mesh", name)
+        yield Finding("error" if ours else "info", "NO_MESH", "no mesh", name)
+    used = gltf.document.get("extensionsUsed", [])
     for extension in gltf.document.get("extensionsRequired", []):
-        yield Finding("warning", "EXTENSION_REQUIRED", f"{extension}: viewers without it refuse the file", name)
-    for index, accessor in enumerate(gltf.items("accessors")):
-        where = f"{name}: accessors/{index}"
-        try:
-            values = gltf.accessor(index)
-        except (ValueError, LookupError, TypeError) as error:
-            yield Finding("error", "ACCESSOR", str(error), where)
-            continue
-        if values.dtype.kind == "f" and not np.isfinite(values).all():
-            yield Finding("error", "NOT_FINITE", "NaN or infinite values", where)
-            continue
-        for key, measured in (("min", values.min(axis=0)), ("max", values.max(axis=0))):
-            if key in accessor and not np.array_equal(np.asarray(accessor[key], values.dtype), np.atleast_1d(measured)):
-                yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, values say {measured.tolist()}", where)
+        message = f"{extension}: viewers without it refuse the file"
+        yield Finding("info" if extension in CODECS else "warning", "EXTENSION_REQUIRED", message, name)
+        if extension not in used:
+            yield Finding("error", "EXTENSION_USED", f"{extension} is required but not among those used", name)
+    place = about.get("extras", {}).get("georeference") if isinstance(about.get("extras"), dict) else None
+    if ours and place is not None:
+        yield from check_place(place, f"{name}: asset.extras.georeference")
+    for index in range(len(gltf.items("accessors"))):
+        yield from _check_accessor(gltf, index, f"{name}: accessors/{index}")
     for index in range(len(gltf.items("images"))):
-        where = f"{name}: images/{index}"
-        try:
-            from PIL import Image
-
-            with Image.open(io.BytesIO(gltf.image(index))) as image:
-                image.load()
-        except (ValueError, LookupError, OSError) as error:
-            yield Finding("error", "IMAGE", str(error), where)
+        yield from _check_image(gltf, index, f"{name}: images/{index}")
     yield from _check_property_tables(gltf)
 
 
-def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str) -> Iterator[Finding]:
-    positions = gltf.accessor(primitive["attributes"]["POSITION"])
-    count = len(positions)
-    if "min" not in gltf.items("accessors")[primitive["attributes"]["POSITION"]]:
+def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
+    accessor = gltf.items("accessors")[index]
+    try:
+        values = gltf.accessor(index)
+    except NotReadHere as reason:
+        yield Finding("info", NOT_HERE, str(reason), where)
+        return
+    except (ValueError, LookupError, TypeError) as error:
+        yield Finding("error", "ACCESSOR", str(error), where)
+        return
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        yield Finding("error", "NOT_FINITE", "NaN or infinite values", where)
+        return
+    if "bufferView" not in accessor and "sparse" not in accessor:
+        return  # zeros, or in the hands of an extension
+    for key, measured in (("min", values.min(axis=0)), ("max", values.max(axis=0))):
+        if key in accessor and not np.array_equal(np.asarray(accessor[key], values.dtype), np.atleast_1d(measured)):
+            yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, values say {measured.tolist()}", where)
+
+
+def _check_image(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
+    from PIL import Image
+
+    try:
+        data = gltf.image(index)
+        if gltf.items("images")[index].get("mimeType") == "image/ktx2":
+            size_of(data)
+            return
+        with Image.open(io.BytesIO(data)) as image:
+            image.load()
+    except NotReadHere as reason:
+        yield Finding("info", NOT_HERE, str(reason), where)
+    except (ValueError, LookupError, OSError) as error:
+        yield Finding("error", "IMAGE", str(error), where)
+
+
+def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bool) -> Iterator[Finding]:
+    attributes = primitive["attributes"]
+    if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
+        raise NotReadHere("compressed with Draco")
+    if "POSITION" not in attributes:
+        yield Finding("error" if ours else "info", "NO_POSITION", "no positions: nothing is drawn", where)
+        return
+    count = len(gltf.accessor(attributes["POSITION"]))
+    if "min" not in gltf.items("accessors")[attributes["POSITION"]]:
         yield Finding("error", "MIN_MAX", "POSITION without min and max", where)
-    for attribute, accessor in primitive["attributes"].items():
+    for attribute, accessor in attributes.items():
         length = len(gltf.accessor(accessor))
         if length != count:
             yield Finding("error", "ATTRIBUTE_COUNT", f"{attribute} has {length} of {count} vertices", where)
-    if "indices" in primitive:
-        indices = gltf.accessor(primitive["indices"])
-        if primitive.get("mode", 4) != 4 or len(indices) % 3:
-            yield Finding("error", "NOT_TRIANGLES", f"mode {primitive.get('mode', 4)}, {len(indices)} indices", where)
-        if indices.max() >= count:
-            # Everything after this would read beyond the vertices.
-            raise ValueError(f"index {int(indices.max())} of {count} vertices")
-    if "NORMAL" in primitive["attributes"]:
-        length = np.linalg.norm(gltf.accessor(primitive["attributes"]["NORMAL"]).astype(np.float64), axis=1)
+    mode = primitive.get("mode", 4)
+    indices = gltf.accessor(primitive["indices"]) if "indices" in primitive else np.arange(count)
+    if mode == 4 and len(indices) % 3:
+        yield Finding("error", "NOT_TRIANGLES", f"mode {mode}, {len(indices)} indices", where)
+    elif mode != 4:
+        yield Finding("error" if ours else "info", "NOT_TRIANGLES", f"mode {mode}: no list of triangles", where)
+    if indices.max() >= count:
+        # Everything after this would read beyond the vertices.
+        raise ValueError(f"index {int(indices.max())} of {count} vertices")
+    if "NORMAL" in attributes:
+        length = np.linalg.norm(gltf.numbers(attributes["NORMAL"]).astype(np.float64), axis=1)
         worst = float(np.abs(length - 1).max())
-        if worst > UNIT_TOLERANCE:
+        if worst > (BYTE_UNIT_TOLERANCE if gltf.accessor(attributes["NORMAL"]).itemsize == 1 else UNIT_TOLERANCE):
             yield Finding("error", "NORMAL_LENGTH", f"normals are up to {worst:.2g} off unit length", where)
-    if "TEXCOORD_0" in primitive["attributes"]:
-        uv = gltf.accessor(primitive["attributes"]["TEXCOORD_0"])
+    if "TEXCOORD_0" in attributes and ours:
+        uv = gltf.numbers(attributes["TEXCOORD_0"])
         if uv.dtype.kind == "f" and (uv.min() < 0 or uv.max() > 1):
             yield Finding("warning", "TEXCOORD_RANGE", "texture coordinates outside [0, 1]", where)
     yield from _check_features(gltf, primitive, where)
@@ -183,36 +222,3 @@ def _check_manifold(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
         yield Finding("error", "MANIFOLD", "vertices at different positions are merged", where)
     if "sparse" in accessor and not {"mergeIndices", "mergeValues"} <= set(extension):
         yield Finding("error", "MANIFOLD", "sparse indices without mergeIndices and mergeValues", where)
-
-
-def find_khronos_validator() -> tuple[str, Path] | None:
-    """Node and the npm package gltf-validator: in NODE_PATH, or in node_modules or build/node/node_modules here or in
-    a folder above. None where either is missing."""
-    node = shutil.which("node")
-    here = Path.cwd()
-    places = [Path(entry) for entry in os.environ.get("NODE_PATH", "").split(os.pathsep) if entry]
-    for folder in (here, *here.parents):
-        places += [folder / "node_modules", folder / "build" / "node" / "node_modules"]
-    package = next((place / "gltf-validator" for place in places if (place / "gltf-validator").is_dir()), None)
-    return (node, package) if node and package else None
-
-
-def khronos_findings(path: Path) -> list[Finding]:
-    """What the Khronos validator says about a file; one info finding where it is not installed."""
-    tool = find_khronos_validator()
-    if tool is None:
-        return [Finding("info", "NO_KHRONOS_VALIDATOR", "npm package gltf-validator not found, skipped", path.name)]
-    command = [tool[0], "-e", _KHRONOS_SCRIPT, str(tool[1].resolve()), str(path.resolve())]
-    run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
-    if run.returncode:
-        return [Finding("warning", "KHRONOS_VALIDATOR", run.stderr.strip()[-300:], path.name)]
-    return [
-        Finding(
-            KHRONOS_SEVERITIES[message["severity"]],
-            message["code"],
-            message["message"],
-            f"{path.name}: {message.get('pointer') or message.get('offset', '')}",
-        )
-        for message in json.loads(run.stdout)["issues"]["messages"]
-        if message["code"] not in KHRONOS_BLIND_SPOTS
-    ]

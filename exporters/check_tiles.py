@@ -1,4 +1,5 @@
-"""Checks of 3D Tiles: the rules of tileset.json, and that every vertex lies inside the volumes that promise it.
+"""Checks of 3D Tiles: the rules of tileset.json, that every vertex lies inside the volumes that promise it, and that
+every figure stands where its own file says.
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html
 """
@@ -8,36 +9,31 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
-from exporters.check_gltf import check_gltf
+from exporters.check_content import Content, read_content
+from exporters.check_metadata import check_entity, read_schema
+from exporters.check_volumes import Matrix, Volume, read_transform, volume_problem
 from exporters.errors import ExportError
-from exporters.findings import Finding
-from exporters.gltf_reader import read_gltf
-from georef.geodesy import geodetic_from_ecef, tile_from_asset
-
-RIGID_TOLERANCE = 1e-9
-"""Largest deviation of a rotation from an orthonormal matrix; float64 rounding leaves some 1e-16."""
+from exporters.findings import Finding, Severity
+from exporters.georeference import placement_of_record
+from georef.geodesy import ecef_from_tile
 
 INSIDE_TOLERANCE_M = 1e-6
 """Vertices this far outside a volume pass: float64 ECEF coordinates are good to 1e-9 m, boxes may be shared."""
 
-Matrix = NDArray[np.float64]
+CHILD_TOLERANCE_M = 1e-3
+"""Volumes of children may reach this far out of their parents': viewers lose nothing by it."""
 
+PLACE_TOLERANCE_M, TURN_TOLERANCE_DEG = 1e-3, 0.01
+"""What we promise of the feet and the nose."""
 
-@dataclass(frozen=True)
-class _Volume:
-    """A bounding volume and the matrix that takes its frame to the frame of the whole tileset."""
-
-    volume: dict[str, Any]
-    matrix: Matrix
-    where: str
+SINCE_1_1 = ("schema", "schemaUri", "metadata", "groups", "contents", "implicitTiling")
 
 
 def check_tileset(path: Path, external: bool = True) -> list[Finding]:
@@ -46,7 +42,7 @@ def check_tileset(path: Path, external: bool = True) -> list[Finding]:
     path : the tileset.json or its folder; external : as for `check_gltf`
     """
     path = path / "tileset.json" if path.is_dir() else path
-    return list(_check_file(path, external, np.eye(4), [], math.inf, frozenset()))
+    return list(_check_file(path, external, _Above(np.eye(4), (), math.inf, False), frozenset()))
 
 
 def read_tileset(path: Path) -> dict[str, Any]:
@@ -60,9 +56,17 @@ def read_tileset(path: Path) -> dict[str, Any]:
         raise ExportError(path, f"no readable tileset ({error})", "write it again") from error
 
 
-def _check_file(
-    path: Path, external: bool, above: Matrix, volumes: list[_Volume], error_above: float, chain: frozenset[Path]
-) -> Iterator[Finding]:
+@dataclass(frozen=True)
+class _Above:
+    """What a tile has from those above it: their transform and volumes, the last one's error, if it was ever turned."""
+
+    matrix: Matrix
+    volumes: tuple[Volume, ...]
+    error: float
+    placed: bool
+
+
+def _check_file(path: Path, external: bool, above: _Above, chain: frozenset[Path]) -> Iterator[Finding]:
     name = path.name
     if path.resolve() in chain:
         yield Finding("error", "CYCLE", "the tileset contains itself", name)
@@ -72,164 +76,150 @@ def _check_file(
     except ExportError as problem:
         yield Finding("error", "UNREADABLE", problem.finding, name)
         return
-    version = document.get("asset", {}).get("version")
+    asset = document.get("asset", {})
+    version = asset.get("version")
     if version not in ("1.0", "1.1"):
-        yield Finding("error", "VERSION", f"asset.version is {version}, expected 1.1", f"{name}: asset")
+        yield Finding("error", "VERSION", f"asset.version is {version}, expected 1.0 or 1.1", f"{name}: asset")
     error = _geometric_error(document)
     if error is None:
         yield Finding("error", "GEOMETRIC_ERROR", "the tileset needs a geometricError of 0 or more", name)
         error = math.inf
     if document["root"].get("refine") not in ("ADD", "REPLACE"):
         yield Finding("error", "REFINE", "the root tile needs refine ADD or REPLACE", f"{name}: root")
-    if metadata := document.get("metadata"):
-        if metadata.get("class") not in document.get("schema", {}).get("classes", {}):
-            yield Finding("error", "METADATA", f"class {metadata.get('class')} is not in the schema", name)
-        if "id" not in document.get("schema", {}):
-            yield Finding("error", "SCHEMA_ID", "the schema has no id", name)
-    walk = _Walk(path, external, chain | {path.resolve()})
-    yield from walk.tile(document["root"], above, volumes, min(error, error_above), f"{name}: root")
+    for extension in document.get("extensionsRequired", []):
+        yield Finding("info", "NOT_CHECKED", f"extension {extension} is not looked into", name)
+    schema, findings = read_schema(document, path)
+    yield from findings
+    if "metadata" in document:
+        yield from check_entity(document["metadata"], schema, name)
+    for index, group in enumerate(document.get("groups", [])):
+        yield from check_entity(group, schema, f"{name}: groups/{index}")
+    ours = asset.get("generator") == "fig2mesh"
+    up_axis = str(asset.get("gltfUpAxis", "Y")).upper()
+    walk = _Walk(path, external, chain | {path.resolve()}, schema, version == "1.0", ours, up_axis)
+    yield from walk.too_new(document, name)
+    yield from walk.tile(document["root"], replace(above, error=min(error, above.error)), f"{name}: root")
 
 
 @dataclass(frozen=True)
 class _Walk:
+    """One tileset file: where it is, what its tiles are checked against."""
+
     path: Path
     external: bool
     chain: frozenset[Path]
+    schema: dict[str, Any] | None
+    old: bool
+    ours: bool
+    up_axis: str
 
-    def tile(
-        self, tile: dict[str, Any], above: Matrix, volumes: list[_Volume], error_above: float, where: str
-    ) -> Iterator[Finding]:
-        local, problem = _transform(tile.get("transform"))
+    def too_new(self, item: dict[str, Any], where: str) -> Iterator[Finding]:
+        if self.old:
+            for key in SINCE_1_1:
+                if key in item:
+                    yield Finding("warning", "VERSION_1_1", f"{key} is not of version 1.0", where)
+
+    def tile(self, tile: dict[str, Any], above: _Above, where: str) -> Iterator[Finding]:
+        local, problem, unusual = read_transform(tile.get("transform"))
         if problem:
             yield Finding("error", "TRANSFORM", problem, where)
             return
-        matrix = above @ local
+        if unusual:
+            yield Finding("error" if self.ours else "warning", "TRANSFORM", unusual, where)
+        matrix = above.matrix @ local
         error = _geometric_error(tile)
         if error is None:
             yield Finding("error", "GEOMETRIC_ERROR", "the tile needs a geometricError of 0 or more", where)
-            error = error_above
-        elif error > error_above:
-            message = f"geometricError {error:g} is larger than {error_above:g} of what it refines"
+            error = above.error
+        elif error > above.error:
+            message = f"geometricError {error:g} is larger than {above.error:g} of what it refines"
             yield Finding("error", "GEOMETRIC_ERROR", message, where)
         elif tile.get("children") and error == 0:
             yield Finding("warning", "NEVER_REFINED", "geometricError 0: viewers never load the children", where)
-        problem = _volume_problem(tile.get("boundingVolume"))
+        yield from self.too_new(tile, where)
+        if "metadata" in tile:
+            yield from check_entity(tile["metadata"], self.schema, where)
+        volumes = above.volumes
+        problem = volume_problem(tile.get("boundingVolume"))
         if problem:
             yield Finding("error", "BOUNDING_VOLUME", problem, where)
         else:
-            volumes = [*volumes, _Volume(tile["boundingVolume"], matrix, where)]
-        contents = [tile["content"]] if "content" in tile else tile.get("contents", [])
-        for content in contents:
-            inner = list(volumes)
-            if "boundingVolume" in content:
-                inner.append(_Volume(content["boundingVolume"], matrix, where))
-            yield from self.content(content.get("uri", ""), matrix, inner, error, where)
+            volume = Volume(tile["boundingVolume"], matrix, where)
+            out = volumes[-1].holds(volume) if volumes else 0.0
+            if out > CHILD_TOLERANCE_M:
+                # Legal, as only content has to be inside; ours keep to more.
+                severity: Severity = "warning" if self.ours else "info"
+                yield Finding(severity, "CHILD_VOLUME", f"reaches {out:.3g} m out of its parent's volume", where)
+            volumes = (*volumes, volume)
+        here = _Above(matrix, volumes, error, above.placed or "transform" in tile)
+        yield from self.contents(tile, here, where)
         for index, child in enumerate(tile.get("children", [])):
-            yield from self.tile(child, matrix, volumes, error, f"{where}/children/{index}")
+            yield from self.tile(child, here, f"{where}/children/{index}")
 
-    def content(
-        self, uri: str, matrix: Matrix, volumes: list[_Volume], error: float, where: str
-    ) -> Iterator[Finding]:  # fmt: skip
+    def contents(self, tile: dict[str, Any], here: _Above, where: str) -> Iterator[Finding]:
+        if "implicitTiling" in tile:
+            yield Finding("info", "NOT_CHECKED", "implicit tiling: its subtrees are not looked into", where)
+            return
+        for content in [tile["content"]] if "content" in tile else tile.get("contents", []):
+            inner = here
+            if "boundingVolume" in content:
+                if problem := volume_problem(content["boundingVolume"]):
+                    yield Finding("error", "BOUNDING_VOLUME", problem, f"{where}: content")
+                else:
+                    volume = Volume(content["boundingVolume"], here.matrix, f"{where}: content")
+                    inner = replace(here, volumes=(*here.volumes, volume))
+            if "metadata" in content:
+                yield from check_entity(content["metadata"], self.schema, f"{where}: content")
+            # Before 1.0 was final, and in old exports since, the name was url.
+            yield from self.content(str(content.get("uri", content.get("url", ""))), inner, where)
+
+    def content(self, uri: str, here: _Above, where: str) -> Iterator[Finding]:
+        if uri.startswith(("http:", "https:", "data:", "//")):
+            yield Finding("info", "NOT_CHECKED", f"content {uri[:60]} is elsewhere", where)
+            return
         file = self.path.parent / unquote(uri)
+        if not file.is_file():
+            file = self.path.parent / unquote(uri.partition("?")[0].partition("#")[0])
         if not uri or not file.is_file():
             yield Finding("error", "CONTENT", f"content {uri!r} is not there", where)
             return
-        if file.suffix.lower() == ".json":
-            yield from _check_file(file, self.external, matrix, volumes, error, self.chain)
+        content = read_content(file, self.external, self.up_axis)
+        if content.kind == "tileset":
+            yield from _check_file(file, self.external, here, self.chain)
             return
-        if file.suffix.lower() not in (".glb", ".gltf"):
-            yield Finding("warning", "CONTENT", f"content {uri!r} is of a kind that is not checked here", where)
-            return
-        yield from check_gltf(file, self.external)
-        try:
-            vertices = read_gltf(file).scene_vertices()
-        except (ExportError, ValueError, LookupError, TypeError):
-            return  # check_gltf has said so
-        points = tile_from_asset().apply(vertices)
-        for volume in volumes:
-            # Into the volume's own frame before anything is compared: ECEF coordinates would cost eight digits.
-            inner_from_outer = np.linalg.inv(volume.matrix) @ matrix
-            if "region" in volume.volume:
-                outside = _outside(volume.volume, points @ matrix[:3, :3].T + matrix[:3, 3])
-            else:
-                outside = _outside(volume.volume, points @ inner_from_outer[:3, :3].T + inner_from_outer[:3, 3])
-            if outside > INSIDE_TOLERANCE_M:
-                message = f"{uri}: vertices up to {outside:.3g} m outside the bounding volume"
-                yield Finding("error", "OUTSIDE_VOLUME", message, volume.where)
+        yield from content.findings
+        if self.old and file.suffix.lower() in (".glb", ".gltf"):
+            yield Finding("warning", "VERSION_1_1", "glTF is no content of version 1.0", where)
+        if content.points is not None and len(content.points):
+            for volume in here.volumes:
+                outside = volume.outside(content.points, here.matrix)
+                if outside > INSIDE_TOLERANCE_M:
+                    message = f"{uri}: vertices up to {outside:.3g} m outside the bounding volume"
+                    yield Finding("error", "OUTSIDE_VOLUME", message, volume.where)
+        yield from _check_place(content, here, f"{where}: {uri}")
+
+
+def _check_place(content: Content, here: _Above, where: str) -> Iterator[Finding]:
+    """A figure's place by the transforms above it against the one that its file records."""
+    if content.georeference is None:
+        return
+    try:
+        wanted = ecef_from_tile(placement_of_record(content.georeference)).matrix
+    except ValueError as error:
+        yield Finding("warning", "PLACE", str(error), where)
+        return
+    away = float(np.linalg.norm(here.matrix[:3, 3] - wanted[:3, 3]))
+    # Of the whole rotation, as bearings mean nothing at the poles: sin(angle / 2) from the largest difference.
+    gap = float(np.linalg.norm(here.matrix[:3, :3] - wanted[:3, :3])) / math.sqrt(8)
+    turn = math.degrees(2 * math.asin(min(gap, 1.0)))
+    if not here.placed:
+        yield Finding("error", "PLACE", "no transform takes it to the place that its file records", where)
+    elif away > PLACE_TOLERANCE_M or turn > TURN_TOLERANCE_DEG:
+        message = f"{away:.3g} m and {turn:.3g} degrees from the place that its file records"
+        yield Finding("error", "PLACE", message, where)
 
 
 def _geometric_error(item: dict[str, Any]) -> float | None:
     value = item.get("geometricError")
     usable = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value >= 0
     return float(value) if usable and value is not None else None
-
-
-def _numbers(values: Any, count: int) -> bool:
-    return (
-        isinstance(values, list)
-        and len(values) == count
-        and all(isinstance(value, int | float) and math.isfinite(value) for value in values)
-    )
-
-
-def _transform(values: Any) -> tuple[Matrix, str]:
-    if values is None:
-        return np.eye(4), ""
-    if not _numbers(values, 16):
-        return np.eye(4), "the transform is not 16 finite numbers"
-    matrix = np.asarray(values, dtype=np.float64).reshape(4, 4).T
-    if matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
-        return matrix, "the transform is not affine; is it written row by row?"
-    rotation = matrix[:3, :3]
-    off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    if off > RIGID_TOLERANCE or np.linalg.det(rotation) < 0:
-        return matrix, f"the transform is not rigid: off by {off:.2g}"
-    return matrix, ""
-
-
-def _volume_problem(volume: Any) -> str:
-    if not isinstance(volume, dict):
-        return "no bounding volume"
-    if "box" in volume:
-        if not _numbers(volume["box"], 12):
-            return "box is not 12 finite numbers"
-        axes = np.array(volume["box"][3:]).reshape(3, 3)
-        return "" if abs(np.linalg.det(axes)) > 0 else "box is flat"
-    if "sphere" in volume:
-        return "" if _numbers(volume["sphere"], 4) and volume["sphere"][3] > 0 else "sphere is not 4 numbers"
-    if "region" in volume:
-        region = volume["region"]
-        if not _numbers(region, 6):
-            return "region is not 6 finite numbers"
-        west, south, east, north, low, high = region
-        angles = max(abs(west), abs(east)) <= math.pi and max(abs(south), abs(north)) <= math.pi / 2
-        ordered = south <= north and low <= high
-        return "" if angles and ordered else "region is not in radians, or not west, south, east, north, low, high"
-    return "bounding volume is neither box nor sphere nor region"
-
-
-def _outside(volume: dict[str, Any], points: NDArray[np.float64]) -> float:
-    """How far, in metres, the farthest point lies outside: points in the volume's frame, ECEF for a region."""
-    if not len(points):
-        return 0.0
-    if "box" in volume:
-        box = np.asarray(volume["box"], dtype=np.float64)
-        axes = box[3:].reshape(3, 3)
-        length = np.linalg.norm(axes, axis=1)
-        along = (points - box[:3]) @ np.linalg.inv(axes)
-        return float(((np.abs(along) - 1) * length).max())
-    if "sphere" in volume:
-        sphere = np.asarray(volume["sphere"], dtype=np.float64)
-        return float((np.linalg.norm(points - sphere[:3], axis=1) - sphere[3]).max())
-    west, south, east, north, low, high = volume["region"]
-    lon, lat, height = geodetic_from_ecef(points).T
-    lon, lat = np.radians(lon), np.radians(lat)
-    # Regions may cross the antimeridian, with west greater than east.
-    past = np.mod(lon - west, 2 * math.pi)
-    width = np.mod(east - west, 2 * math.pi) if east - west < 2 * math.pi else 2 * math.pi
-    sideways = np.where(past <= width, 0.0, np.minimum(past - width, 2 * math.pi - past)) * np.cos(lat)
-    radius = 6378137.0
-    return float(
-        max(sideways.max() * radius, (south - lat).max() * radius, (lat - north).max() * radius,
-            (low - height).max(), (height - high).max())
-    )  # fmt: skip

@@ -1,17 +1,26 @@
 """Checks of OpenUSD files: pxr.UsdValidation, the topology check it leaves out, and our own promises.
 
+Files from elsewhere promise less: what USD does not demand of them (metres, y up, a closed solid) is worth an info.
+Every variant of the default prim is looked at, one variant set at a time, the others as they are selected.
+
 https://openusd.org/release/api/usd_validation_page_front.html
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from exporters.check_usdz import check_usdz
 from exporters.errors import ExportError
-from exporters.findings import Finding, Severity, check_solid
+from exporters.findings import Finding, Severity, as_infos, check_solid
+from exporters.usd_place import check_usd_place
+
+MAX_VARIANTS = 20
+"""Variants of one set that are looked at: some files of others have hundreds."""
 
 
 def open_stage(path: Path) -> Any:
@@ -31,12 +40,62 @@ def open_stage(path: Path) -> Any:
     return stage
 
 
+def is_ours(stage: Any) -> bool:
+    """Whether the root layer says that fig2mesh wrote it."""
+    return bool(stage.GetRootLayer().customLayerData.get("generator") == "fig2mesh")
+
+
+def variations(stage: Any) -> Iterator[str]:
+    """Select every variant of the default prim in turn, in the session layer, and give its name, "" for none."""
+    from pxr import Usd
+
+    prim = stage.GetDefaultPrim()
+    if not prim or not prim.GetVariantSets().GetNames():
+        yield ""
+        return
+    sets = prim.GetVariantSets()
+    names = sets.GetNames()
+    for name in names:
+        variants = sets.GetVariantSet(name)
+        before = variants.GetVariantSelection()
+        for variant in variants.GetVariantNames()[:MAX_VARIANTS]:
+            with Usd.EditContext(stage, stage.GetSessionLayer()):
+                variants.SetVariantSelection(variant)
+            yield f"{name}={variant}"
+        with Usd.EditContext(stage, stage.GetSessionLayer()):
+            variants.SetVariantSelection(before)
+
+
 def check_usd(path: Path) -> list[Finding]:
     """Findings about a .usda, .usdc or .usdz file."""
+    findings = check_usdz(path) if path.suffix.lower() == ".usdz" and path.is_file() else []
     try:
         stage = open_stage(path)
     except ExportError as error:
-        return [Finding("error", "UNREADABLE", error.finding, path.name)]
+        return [Finding("error", "UNREADABLE", error.finding, path.name), *findings]
+    from pxr import UsdGeom
+
+    ours = is_ours(stage)
+    if UsdGeom.GetStageMetersPerUnit(stage) != 1.0 or UsdGeom.GetStageUpAxis(stage) != UsdGeom.Tokens.y:
+        found = f"{UsdGeom.GetStageMetersPerUnit(stage):g} m a unit, {UsdGeom.GetStageUpAxis(stage)} up"
+        message = f"the stage has {found}" + (", not metres and Y" if ours else "")
+        findings.append(Finding("error" if ours else "info", "STAGE_UNITS", message, path.name))
+    findings += check_usd_place(stage, path.name, ours)
+    for variation in variations(stage):
+        name = f"{path.name}: {variation}" if variation else path.name
+        # What all variants share would be found again in each.
+        findings += [finding for finding in _check_selected(stage, name, ours) if not _known(finding, findings)]
+    return findings
+
+
+def _known(finding: Finding, before: list[Finding]) -> bool:
+    def key(each: Finding) -> tuple[str, str, str]:
+        return each.code, each.message, each.where.rpartition(": ")[2]
+
+    return any(key(finding) == key(each) for each in before)
+
+
+def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
     from pxr import UsdGeom, UsdShade, UsdValidation
 
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
@@ -47,50 +106,65 @@ def check_usd(path: Path) -> list[Finding]:
     findings = []
     for issue in UsdValidation.ValidationContext(validators).Validate(stage):
         paths = [str(site.GetPrim().GetPath()) for site in issue.GetSites() if site.IsPrim()]
-        where = ": ".join([path.name, *paths[:1]])
+        where = ": ".join([name, *paths[:1]])
         findings.append(Finding(severities.get(issue.GetType(), "info"), issue.GetName(), issue.GetMessage(), where))
-    if UsdGeom.GetStageMetersPerUnit(stage) != 1.0 or UsdGeom.GetStageUpAxis(stage) != UsdGeom.Tokens.y:
-        findings.append(Finding("error", "STAGE_UNITS", "the stage is not in metres with y up", path.name))
-    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    prims = list(stage.Traverse())
+    meshes = [UsdGeom.Mesh(prim) for prim in prims if prim.IsA(UsdGeom.Mesh)]
     if not meshes:
-        findings.append(Finding("error", "NO_MESH", "no mesh", path.name))
+        findings.append(Finding("error" if ours else "info", "NO_MESH", "no mesh", name))
     for mesh in meshes:
-        findings += _check_mesh(mesh, f"{path.name}: {mesh.GetPath()}")
-    for prim in stage.Traverse():
+        findings += _check_mesh(mesh, f"{name}: {mesh.GetPath()}", ours)
+    for prim in prims:
         shader = UsdShade.Shader(prim)
-        if shader and shader.GetIdAttr().Get() == "UsdUVTexture":
-            asset = shader.GetInput("file").Get()
-            if asset is None or not asset.resolvedPath:
-                findings.append(Finding("error", "TEXTURE", f"{asset} is not there", f"{path.name}: {prim.GetPath()}"))
+        if not shader or shader.GetIdAttr().Get() != "UsdUVTexture":
+            continue
+        file = shader.GetInput("file")
+        asset = file.Get() if file else None
+        if asset is not None and ("<UDIM>" in asset.path or file.HasConnectedSource()):
+            continue  # named by a pattern, or elsewhere
+        if asset is None or not asset.resolvedPath:
+            findings.append(Finding("error", "TEXTURE", f"{asset} is not there", f"{name}: {prim.GetPath()}"))
     return findings
 
 
-def _check_mesh(mesh: Any, where: str) -> list[Finding]:
-    from pxr import UsdGeom
+def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
+    from pxr import Usd, UsdGeom
 
+    promise: Severity = "error" if ours else "info"
+    first = Usd.TimeCode.EarliestTime()  # of what does not move, its only value
     findings = []
     if mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none:
-        findings.append(Finding("error", "SUBDIVISION", "subdivisionScheme is not none: viewers smooth it", where))
-    points = np.array(mesh.GetPointsAttr().Get() or [], dtype=np.float64).reshape(-1, 3)
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get() or [], dtype=np.int64)
-    indices = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], dtype=np.int64)
+        findings.append(Finding(promise, "SUBDIVISION", "subdivisionScheme is not none: viewers smooth it", where))
+    points = np.array(mesh.GetPointsAttr().Get(first) or [], dtype=np.float64).reshape(-1, 3)
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(first) or [], dtype=np.int64)
+    indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(first) or [], dtype=np.int64)
+    if not len(indices) and not ours:
+        return [*findings, Finding("info", "NO_FACES", "no faces", where)]
     valid, reason = UsdGeom.Mesh.ValidateTopology(
-        mesh.GetFaceVertexIndicesAttr().Get() or [], mesh.GetFaceVertexCountsAttr().Get() or [], len(points)
+        mesh.GetFaceVertexIndicesAttr().Get(first) or [], mesh.GetFaceVertexCountsAttr().Get(first) or [], len(points)
     )
     if not valid or not len(indices):
         return [*findings, Finding("error", "TOPOLOGY", str(reason) or "no faces", where)]
     if not np.isfinite(points).all():
         return [*findings, Finding("error", "NOT_FINITE", "points are NaN or infinite", where)]
-    extent = np.array(mesh.GetExtentAttr().Get() or np.full((2, 3), np.nan), dtype=np.float64)
+    extent = np.array(mesh.GetExtentAttr().Get(first) or np.full((2, 3), np.nan), dtype=np.float64)
     if not np.array_equal(extent, [points.min(axis=0), points.max(axis=0)]):
-        findings.append(Finding("error", "EXTENT", f"extent is {extent.tolist()}, not that of the points", where))
+        # A larger one is as good; without one, or with a smaller, viewers may cull what can be seen.
+        holds = bool((extent[0] <= points.min(axis=0)).all() and (extent[1] >= points.max(axis=0)).all())
+        severity: Severity = "error" if ours else "info" if holds else "warning"
+        findings.append(Finding(severity, "EXTENT", f"extent is {extent.tolist()}, not that of the points", where))
     for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues():
         size = {"constant": 1, "uniform": len(counts), "vertex": len(points), "faceVarying": len(indices)}
+        size["varying"] = size["vertex"]
         expected = size.get(primvar.GetInterpolation())
-        found = len(primvar.ComputeFlattened() or [])
-        if expected is not None and primvar.GetTypeName().isArray and found != expected:
-            message = f"{primvar.GetName()} has {found} values, expected {expected}"
+        found = len(primvar.ComputeFlattened(first) or []) if primvar.GetTypeName().isArray else 0
+        times = primvar.GetElementSize()
+        if expected is not None and primvar.GetTypeName().isArray and found != expected * times:
+            message = f"{primvar.GetName()} has {found} values, expected {expected * times}"
             findings.append(Finding("error", "PRIMVAR", message, where))
     if (counts != 3).any():
         return [*findings, Finding("info", "NOT_TRIANGLES", "faces are not all triangles", where)]
-    return findings + check_solid(points, indices.reshape(-1, 3), where)
+    flip = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
+    faces = indices.reshape(-1, 3)[:, ::-1] if flip else indices.reshape(-1, 3)
+    solid = check_solid(points, faces, where)
+    return findings + (solid if ours else as_infos(solid))

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
+from exporters.georeference import placement_of_record, placement_of_tile
 from exporters.solid import measure_topology
+from georef.geodesy import ecef_from_geodetic, ecef_from_tile
+from georef.transform import column_major
 
 Severity = Literal["error", "warning", "info"]
 
@@ -53,3 +58,40 @@ def check_solid(vertices: NDArray[Any], faces: NDArray[Any], where: str) -> list
     if found.solid and found.volume <= 0:
         findings.append(Finding("error", "INSIDE_OUT", f"encloses {found.volume:.3g} cubic metres", where))
     return findings
+
+
+def as_infos(findings: Iterable[Finding]) -> list[Finding]:
+    """The same findings as worth knowing only: for files that promise nothing of the kind."""
+    return [replace(finding, severity="info") for finding in findings]
+
+
+PLACE_TOLERANCE_M = 1e-6
+"""How far a place may come back from where it was said to be: float64 has steps of 1e-9 m at the earth's surface."""
+
+
+def check_place(record: Any, where: str) -> list[Finding]:
+    """Whether the record of a place names one, and longitude, latitude and height survive the way to ECEF and back.
+
+    record : as `exporters.georeference.georeference` makes it
+    """
+    if not isinstance(record, Mapping):
+        return [Finding("error", "GEOREFERENCE", "is no record of a place", where)]
+    try:
+        place = placement_of_record(record)
+        back = placement_of_tile(column_major(ecef_from_tile(place)))
+    except ValueError as error:
+        return [Finding("error", "GEOREFERENCE", str(error), where)]
+    said = (place.lon_deg, place.lat_deg, place.height_m)
+    return check_same_place(
+        said, (back["lon_deg"], back["lat_deg"], back["height_m"]), "the way to ECEF and back", where
+    )
+
+
+def check_same_place(
+    one: tuple[float, float, float], two: tuple[float, float, float], who: str, where: str
+) -> list[Finding]:
+    """Whether two places, each longitude and latitude in degrees and ellipsoidal height in metres, are one."""
+    apart = float(np.linalg.norm(ecef_from_geodetic(one) - ecef_from_geodetic(two)))
+    if apart <= PLACE_TOLERANCE_M:
+        return []
+    return [Finding("error", "GEOREFERENCE", f"{who} gives a place {apart:.3g} m away", where)]

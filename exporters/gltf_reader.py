@@ -15,11 +15,17 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters import meshopt
 from exporters.errors import ExportError
 from exporters.solid import merged_by_position
 
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+class NotReadHere(ValueError):
+    """Sound data in a form that is not decoded here, or whose decoder is not installed."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +42,21 @@ class Gltf:
         return found if isinstance(found, list) else []
 
     def view(self, index: int) -> bytes:
-        """The bytes of a buffer view. Raises ValueError where it lies outside its buffer."""
+        """The bytes of a buffer view, decompressed if they are compressed.
+
+        Raises ValueError where it lies outside its buffer, NotReadHere without the decoder.
+        """
         view = self.items("bufferViews")[index]
+        for name in MESHOPT:
+            if name in view.get("extensions", {}):
+                packed = view["extensions"][name]
+                try:
+                    return meshopt.decode(self._span(packed, index), packed)
+                except ExportError as error:
+                    raise NotReadHere(f"bufferView {index}: {error.finding}; {error.remedy}") from error
+        return self._span(view, index)
+
+    def _span(self, view: dict[str, Any], index: int) -> bytes:
         data: bytes = self.buffers[view["buffer"]]
         begin, length = int(view.get("byteOffset", 0)), int(view["byteLength"])
         if begin < 0 or begin + length > len(data):
@@ -69,6 +88,14 @@ class Gltf:
             )
         return values[:, 0] if width == 1 else values
 
+    def numbers(self, index: int) -> NDArray[Any]:
+        """An accessor's values as floats where it says that its integers are normalised, else as they are."""
+        values = self.accessor(index)
+        if not self.items("accessors")[index].get("normalized") or values.dtype.kind == "f":
+            return values
+        scaled = values.astype(np.float64) / np.iinfo(values.dtype).max
+        return np.maximum(scaled, -1.0) if values.dtype.kind == "i" else scaled
+
     def _strided(
         self, view: int, offset: int, dtype: np.dtype[Any], count: int, width: int, stride: int | None
     ) -> NDArray[Any]:
@@ -90,11 +117,18 @@ class Gltf:
         return _resource(self.path, item["uri"])
 
     def mesh_arrays(self, mesh: int = 0, primitive: int = 0) -> tuple[NDArray[Any], NDArray[np.int64]]:
-        """Positions (V, 3) float32 in the ASSET frame and triangles (F, 3) of one primitive."""
+        """Positions (V, 3) and triangles (F, 3) of one primitive, in the frame of its mesh.
+
+        Strips and fans become triangles; points and lines have none. Raises NotReadHere for Draco's compression.
+        """
         item = self.items("meshes")[mesh]["primitives"][primitive]
-        positions = self.accessor(item["attributes"]["POSITION"])
+        if "KHR_draco_mesh_compression" in item.get("extensions", {}):
+            raise NotReadHere("compressed with Draco")
+        if "POSITION" not in item["attributes"]:
+            return np.empty((0, 3), np.float32), np.empty((0, 3), np.int64)
+        positions = self.numbers(item["attributes"]["POSITION"])
         indices = self.accessor(item["indices"]) if "indices" in item else np.arange(len(positions))
-        return positions, indices.astype(np.int64).reshape(-1, 3)
+        return positions, _triangles(indices.astype(np.int64), item.get("mode", 4))
 
     def solid_arrays(self, mesh: int = 0) -> tuple[NDArray[Any], NDArray[Any]]:
         """Positions and triangles of a mesh with its seams undone.
@@ -106,7 +140,7 @@ class Gltf:
         if extension is not None:
             primitive = extension["manifoldPrimitive"]
             indices = self.accessor(primitive["indices"]).astype(np.int64)
-            return self.accessor(primitive["attributes"]["POSITION"]), indices.reshape(-1, 3)
+            return self.numbers(primitive["attributes"]["POSITION"]), indices.reshape(-1, 3)
         parts = [self.mesh_arrays(mesh, primitive) for primitive in range(len(item["primitives"]))]
         starts = np.cumsum([0, *(len(positions) for positions, _ in parts)])
         positions = np.concatenate([positions for positions, _ in parts])
@@ -117,7 +151,8 @@ class Gltf:
         """The meshes of the default scene, each with its (4, 4) matrix scene_from_mesh."""
         nodes, found = self.items("nodes"), []
         scenes = self.items("scenes")
-        roots = scenes[self.document.get("scene", 0)].get("nodes", []) if scenes else range(len(nodes))
+        below = {child for node in nodes for child in node.get("children", [])}
+        roots = scenes[self.document.get("scene", 0)].get("nodes", []) if scenes else set(range(len(nodes))) - below
         pending = [(index, np.eye(4), 0) for index in roots]
         while pending:
             index, above, depth = pending.pop()
@@ -130,13 +165,40 @@ class Gltf:
         return found
 
     def scene_vertices(self) -> NDArray[np.float64]:
-        """All vertices (N, 3) float64 of the default scene, y-up."""
+        """All vertices (N, 3) float64 of the default scene, y-up: the ASSET frame of files of ours."""
         clouds = [np.empty((0, 3))]
         for mesh, matrix in self.instances():
             for primitive in range(len(self.items("meshes")[mesh]["primitives"])):
-                positions = self.mesh_arrays(mesh, primitive)[0].astype(np.float64)
-                clouds.append(positions @ matrix[:3, :3].T + matrix[:3, 3])
+                clouds.append(_moved(self.mesh_arrays(mesh, primitive)[0], matrix))
         return np.concatenate(clouds)
+
+    def scene_solids(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
+        """Positions and triangles of each mesh of the default scene where it stands there, its seams undone."""
+        solids = []
+        for mesh, matrix in self.instances():
+            vertices, faces = self.solid_arrays(mesh)
+            mirrored = np.linalg.det(matrix[:3, :3]) < 0
+            solids.append((_moved(vertices, matrix), faces[:, ::-1] if mirrored else faces))
+        return solids
+
+
+def _moved(vertices: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[Any]:
+    if np.array_equal(matrix, np.eye(4)):
+        return vertices  # as they are in the file, to the bit
+    return vertices.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """Corners (F, 3) of triangles, a strip or a fan, by the `mode` of the primitive; none for points and lines."""
+    if mode == 4:
+        return indices.reshape(-1, 3)
+    if mode not in (5, 6) or len(indices) < 3:
+        return np.empty((0, 3), np.int64)
+    if mode == 6:
+        return np.stack([np.full(len(indices) - 2, indices[0]), indices[1:-1], indices[2:]], axis=1)
+    faces = np.stack([indices[:-2], indices[1:-1], indices[2:]], axis=1)
+    faces[1::2, [1, 2]] = faces[1::2, [2, 1]]  # every other triangle of a strip runs the other way
+    return faces
 
 
 def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
@@ -206,6 +268,9 @@ def _with_buffers(document: dict[str, Any], binary: bytes | None, path: Path) ->
         raise ValueError("the document is not a JSON object")
     buffers = []
     for index, item in enumerate(document.get("buffers", [])):
+        if "uri" not in item and any(item.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT):
+            buffers.append(b"")  # stands for what the compressed views hold
+            continue
         data = _resource(path, item["uri"]) if "uri" in item else binary
         if data is None or len(data) < item["byteLength"]:
             raise ValueError(f"buffer {index} has {len(data or b'')} bytes, expected {item['byteLength']}")

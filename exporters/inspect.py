@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import itertools
-import json
-import math
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -13,14 +10,15 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from exporters.check_tiles import read_tileset
-from exporters.check_usd import open_stage
 from exporters.errors import ExportError
+from exporters.facts import file_sizes, solid_facts, texture_size
 from exporters.georeference import placement_of_tile
 from exporters.gltf_reader import Gltf, read_gltf
-from exporters.solid import measure_topology, merged_by_position
+from exporters.inspect_places import collection_facts, places_facts
+from exporters.inspect_usd import usd_facts
+from exporters.solid import merged_by_position
 from exporters.validate import read_triangles
 
 
@@ -55,42 +53,17 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
 def _inspect_any(path: Path) -> dict[str, Any]:
     suffix = path.suffix.lower()
     if path.is_dir() or suffix == ".json":
-        return _inspect_tileset(path / "tileset.json" if path.is_dir() else path)
+        tileset = path / "tileset.json" if path.is_dir() else path
+        return collection_facts(tileset) or _inspect_tileset(tileset)
+    if suffix in (".czml", ".geojson"):
+        return places_facts(path, _inspect_gltf)
     if suffix in (".glb", ".gltf"):
         return _inspect_gltf(path)
     if suffix in (".usda", ".usdc", ".usdz"):
-        return _inspect_usd(path)
+        return usd_facts(path)
     if suffix in (".ply", ".obj"):
         return _inspect_triangles(path)
     raise ExportError(path, f"cannot inspect suffix {suffix or 'none'}", "see exporters.write.FORMATS")
-
-
-def _solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
-    if not len(faces):
-        return {"triangles": 0}
-    found = measure_topology(vertices, faces)
-    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
-    return {
-        "triangles": len(faces),
-        "bounds_m": [low.tolist(), high.tolist()],
-        "size_m": (high - low).tolist(),
-        "watertight": found.closed,
-        "solid": found.solid,
-        "components": found.components,
-        "genus": found.genus,
-        "volume_m3": found.volume,
-    }
-
-
-def _files(*paths: Path) -> dict[str, int]:
-    return {path.name: path.stat().st_size for path in paths if path.is_file()}
-
-
-def _texture_size(data: bytes) -> list[int]:
-    from PIL import Image
-
-    with Image.open(io.BytesIO(data)) as image:
-        return [image.width, image.height]
 
 
 def _inspect_gltf(path: Path) -> dict[str, Any]:
@@ -105,7 +78,7 @@ def _gltf_facts(gltf: Gltf) -> dict[str, Any]:
     asset = gltf.document.get("asset", {})
     extras = asset.get("extras", {})
     meshes = range(len(gltf.items("meshes")))
-    solids = [gltf.solid_arrays(mesh) for mesh in meshes]
+    solids = gltf.scene_solids()
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
     vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
     faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
@@ -114,13 +87,17 @@ def _gltf_facts(gltf: Gltf) -> dict[str, Any]:
     beside = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
     return {
         "format": "glTF 2.0 binary" if gltf.path.suffix.lower() == ".glb" else "glTF 2.0",
-        "files": _files(gltf.path, *beside),
+        "files": file_sizes(gltf.path, *beside),
         "name": next((node["name"] for node in gltf.items("nodes") if "name" in node), None),
         "copyright": asset.get("copyright"),
         "generator": asset.get("generator"),
-        "vertices": sum(len(gltf.mesh_arrays(mesh)[0]) for mesh in meshes),
-        **_solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
-        "texture_px": _texture_size(gltf.image(0)) if gltf.items("images") else None,
+        "vertices": sum(
+            len(gltf.mesh_arrays(mesh, primitive)[0])
+            for mesh in meshes
+            for primitive in range(len(gltf.items("meshes")[mesh]["primitives"]))
+        ),
+        **solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
+        "texture_px": texture_size(gltf.image(0)) if gltf.items("images") else None,
         "parts": _part_names(gltf, tables[0]) if tables else None,
         "observed": _observed(gltf, tables[0]) if tables else None,
         "placement": extras.get("georeference"),
@@ -153,7 +130,7 @@ def _inspect_tileset(path: Path) -> dict[str, Any]:
             lods.append({"uri": uri, "geometric_error_m": tile["geometricError"]})
         children = tile.get("children", [])
         tile = children[0] if len(children) == 1 else None
-    files = _files(path, *(path.parent / unquote(lod["uri"]) for lod in lods))
+    files = file_sizes(path, *(path.parent / unquote(lod["uri"]) for lod in lods))
     facts: dict[str, Any] = {"format": "3D Tiles " + str(document.get("asset", {}).get("version")), "files": files}
     if not lods:
         return facts | {"lods": [], "generator": document.get("asset", {}).get("generator")}
@@ -172,60 +149,6 @@ def _inspect_tileset(path: Path) -> dict[str, Any]:
     return inside | facts | {"placement": placement, "lods": lods[::-1]}
 
 
-def _inspect_usd(path: Path) -> dict[str, Any]:
-    from pxr import UsdGeom, UsdShade
-
-    stage = open_stage(path)
-    facts = stage.GetRootLayer().customLayerData
-    result: dict[str, Any] = {
-        "format": {".usda": "OpenUSD text", ".usdc": "OpenUSD binary", ".usdz": "OpenUSD package"}[path.suffix.lower()],
-        "name": facts.get("name"),
-        "copyright": facts.get("copyright"),
-        "generator": facts.get("generator"),
-        "metadata": json.loads(facts["metadata"]) if "metadata" in facts else None,
-    }
-    files = [path]
-    for prim in stage.Traverse():
-        if prim.IsA(UsdGeom.Mesh) and "triangles" not in result:
-            mesh = UsdGeom.Mesh(prim)
-            points = np.array(mesh.GetPointsAttr().Get() or [], dtype=np.float64).reshape(-1, 3)
-            if any(count != 3 for count in mesh.GetFaceVertexCountsAttr().Get() or []):
-                raise ExportError(path, "holds faces that are not triangles", "triangulate it")
-            faces = np.array(mesh.GetFaceVertexIndicesAttr().Get() or [], dtype=np.int64).reshape(-1, 3)
-            if len(faces) and (faces.min() < 0 or faces.max() >= len(points)):
-                raise ExportError(path, "faces name points that are not there", "see validate")
-            result |= {"vertices": len(points), **_solid_facts(points, faces)}
-            subsets = UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, "part")
-            result["parts"] = [subset.GetPrim().GetName() for subset in subsets] or None
-        shader = UsdShade.Shader(prim)
-        if shader and shader.GetIdAttr().Get() == "UsdUVTexture":
-            from pxr import Ar
-
-            asset = shader.GetInput("file").Get()
-            if asset is not None and asset.resolvedPath:
-                opened = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(asset.resolvedPath))
-                result["texture_px"] = _texture_size(bytes(opened.GetBuffer()))
-                files.append(Path(asset.resolvedPath))
-    result["files"] = _files(*files)
-    result["placement"] = _usd_placement(stage.GetDefaultPrim(), dict(facts.get("georeference", {})))
-    return result
-
-
-def _usd_placement(prim: Any, recorded: dict[str, Any]) -> dict[str, Any] | None:
-    from pxr import Gf, UsdGeom
-
-    if not prim or not prim.HasAttribute("cesium:anchor:longitude"):
-        return None
-    # The stage is east, up, south; where the figure's front, +z, ends up is its heading.
-    front = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0).TransformDir(Gf.Vec3d(0, 0, 1))
-    return recorded | {
-        "lon_deg": prim.GetAttribute("cesium:anchor:longitude").Get(),
-        "lat_deg": prim.GetAttribute("cesium:anchor:latitude").Get(),
-        "height_m": prim.GetAttribute("cesium:anchor:height").Get(),
-        "heading_deg": math.degrees(math.atan2(front[0], -front[2])) % 360.0,
-    }
-
-
 def _inspect_triangles(path: Path) -> dict[str, Any]:
     mesh = read_triangles(path)
     vertices, faces = merged_by_position(np.asarray(mesh.vertices), np.asarray(mesh.faces))
@@ -234,10 +157,10 @@ def _inspect_triangles(path: Path) -> dict[str, Any]:
     beside = [] if ply else [path.with_suffix(".mtl"), path.with_name(f"{path.stem}_texture.png")]
     return {
         "format": "Stanford PLY" if ply else "Wavefront OBJ",
-        "files": _files(path, *beside),
+        "files": file_sizes(path, *beside),
         "name": path.stem,
         "vertices": len(mesh.vertices),
-        **_solid_facts(vertices, faces),
+        **solid_facts(vertices, faces),
         "texture_px": list(image.size) if image is not None else None,
         **_comments(path),
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -82,3 +84,9 @@ def observed_shares(mesh: TexturedMesh) -> dict[int, float] | None:
     return {
         int(label): float(visible[label] / total[label]) if total[label] else 0.0 for label in np.unique(mesh.parts)
     }
+
+
+def observed_share(mesh: TexturedMesh) -> float | None:
+    """Share of the whole surface that the drawing itself showed, in [0, 1]; None without that knowledge."""
+    shares = observed_shares(replace(mesh, parts=np.zeros(len(mesh.vertices), np.uint8)))
+    return None if shares is None else shares.get(0, 0.0)

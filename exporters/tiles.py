@@ -1,6 +1,9 @@
-"""3D Tiles 1.1 with glTF content: a folder of tileset.json and one .glb per level of detail.
+"""3D Tiles of one figure: a folder of tileset.json and one content file per level of detail.
+
+Version 1.1 has binary glTF as content; version 1.0, for clients that do not know the other, batched 3D models.
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html
+https://docs.ogc.org/cs/18-053r2/18-053r2.html
 https://github.com/CesiumGS/3d-tiles/tree/main/specification
 
 The tile transform, in float64, carries the figure from the TILE frame (metres, z up) to ECEF; content stays in the
@@ -14,17 +17,21 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import quote
 
-import numpy as np
-
 from exporters.asset import Asset
+from exporters.b3dm import b3dm_bytes
 from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.glb import glb_bytes
-from georef.geodesy import ecef_from_tile, tile_from_asset
-from georef.transform import column_major
+from exporters.placed_figure import PlacedFigure, ecef_matrix, figure_of
+from exporters.profiles import GENERAL, Profile
+
+TilesVersion = Literal["1.0", "1.1"]
+
+CONTENT_SUFFIXES: dict[TilesVersion, str] = {"1.0": ".b3dm", "1.1": ".glb"}
+"""What content is, by version of 3D Tiles."""
 
 DEFAULT_VISIBLE_FROM_M = 2000.0
 """From how far away a figure is drawn unless asked otherwise, metres."""
@@ -40,9 +47,9 @@ BOX_MARGIN_M = 1e-3
 """Rounding, of a viewer's float32 too, must not push a vertex out of its volume; nor may a volume be flat."""
 
 
-def content_name(name: str, lod: int) -> str:
+def content_name(name: str, lod: int, version: TilesVersion = "1.1") -> str:
     """File name of a level of detail of the asset called `name`: `name.glb`, `name_lod1.glb`, ..."""
-    return safe_name(name) + (f"_lod{lod}" if lod else "") + ".glb"
+    return safe_name(name) + (f"_lod{lod}" if lod else "") + CONTENT_SUFFIXES[version]
 
 
 def safe_name(name: str) -> str:
@@ -50,30 +57,45 @@ def safe_name(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name).strip(".") or "figure"
 
 
-def write_tileset(asset: Asset, path: Path | str, visible_from_m: float = DEFAULT_VISIBLE_FROM_M) -> None:
+def write_tileset(
+    asset: Asset,
+    path: Path | str,
+    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    version: TilesVersion = "1.1",
+    profile: Profile = GENERAL,
+) -> None:
     """Write a figure as a tileset of its own.
 
     asset : a placed asset; `deviation_m` of its levels of detail becomes the tiles' geometric errors
     path : a folder, made if it is not there, or the tileset.json in one; files of the same names are replaced
     visible_from_m : distance from which the figure is drawn at all, on a screen of 1080 rows
+    version : of 3D Tiles
+    profile : what the client of its content takes
 
-    Raises ExportError for an asset without a placement or a distance that is not positive.
+    Raises ExportError for a profile that compresses content of version 1.0, an asset without a placement or a distance
+    that is not positive.
     """
     path = Path(path)
     folder = path.parent if path.name == "tileset.json" else path
-    document = tileset(asset, visible_from_m)
+    if version == "1.0" and profile.compressed:
+        found = f"--profile {profile.name} compresses, and clients of 3D Tiles 1.0 read no such content"
+        raise ExportError("--tiles-version", found, "leave either away")
+    document = tileset(asset, visible_from_m, version)
     folder.mkdir(parents=True, exist_ok=True)
     for lod in range(len(asset.lods)):
-        (folder / content_name(asset.name, lod)).write_bytes(glb_bytes(asset, lod))
+        name = content_name(asset.name, lod, version)
+        data = glb_bytes(asset, lod, profile)
+        (folder / name).write_bytes(b3dm_bytes(data, name) if version == "1.0" else data)
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)
     (folder / "tileset.json").write_bytes(text.encode() + b"\n")
 
 
-def tileset(asset: Asset, visible_from_m: float = DEFAULT_VISIBLE_FROM_M) -> dict[str, Any]:
+def tileset(
+    asset: Asset, visible_from_m: float = DEFAULT_VISIBLE_FROM_M, version: TilesVersion = "1.1"
+) -> dict[str, Any]:
     """The tileset.json of an asset; arguments and errors as for `write_tileset`."""
-    if not (math.isfinite(visible_from_m) and visible_from_m > 0):
-        raise ExportError("--visible-from", f"{visible_from_m:g} m", "give a positive distance in metres")
-    root = root_tile(asset)
+    check_distance(visible_from_m)
+    root = root_tile(asset, version=version)
     assert asset.placement is not None  # root_tile has checked
     properties: dict[str, Any] = {"name": {"type": "STRING", "required": True, "semantic": "NAME"}}
     values: dict[str, Any] = {"name": asset.name}
@@ -81,38 +103,63 @@ def tileset(asset: Asset, visible_from_m: float = DEFAULT_VISIBLE_FROM_M) -> dic
         # 3D Tiles' own `asset` has no copyright field; viewers show credits from the copyright of the glTF content.
         properties["copyright"] = {"type": "STRING", "required": True}
         values["copyright"] = asset.copyright
-    error = max(visible_from_m / VISIBLE_RANGE_PER_ERROR, root["geometricError"])
-    return {
-        "asset": {"version": "1.1", "generator": "fig2mesh", "extras": {"georeference": georeference(asset.placement)}},
+    metadata = {
         "schema": {"id": "fig2mesh_tileset", "classes": {"figure": {"properties": properties}}},
         "metadata": {"class": "figure", "properties": values},
-        "geometricError": error,
+    }
+    extras = {"georeference": georeference(asset.placement)}
+    return {
+        "asset": {"version": version, "generator": "fig2mesh", "extras": extras},
+        **(metadata if version == "1.1" else {"extras": values}),
+        "geometricError": visible_error(visible_from_m, root["geometricError"]),
         "root": root,
     }
 
 
-def root_tile(asset: Asset, folder: str = "") -> dict[str, Any]:
-    """The tile of a figure: its coarsest level of detail, refined by REPLACE down to the finest.
+def check_distance(visible_from_m: float) -> None:
+    """Raise ExportError unless a distance to be seen from is one."""
+    if not (math.isfinite(visible_from_m) and visible_from_m > 0):
+        raise ExportError("--visible-from", f"{visible_from_m:g} m", "give a positive distance in metres")
+
+
+def visible_error(visible_from_m: float, least: float) -> float:
+    """Geometric error, metres, of a tileset whose figures are drawn from that far; not below `least`, its root's."""
+    return max(visible_from_m / VISIBLE_RANGE_PER_ERROR, least)
+
+
+def root_tile(asset: Asset, folder: str = "", version: TilesVersion = "1.1") -> dict[str, Any]:
+    """The tile of a figure, see `figure_tile`.
 
     asset : a placed asset
-    folder : where its content lies as seen from the tileset, "" or "name/"; for tilesets of many figures
+    folder : where its content lies as seen from the tileset, "" or "name/"
 
-    `transform` takes TILE to ECEF; the box, in the TILE frame, holds every vertex of every level. Raises ExportError
-    for an asset without a placement.
+    Raises ExportError for an asset without a placement.
     """
-    if asset.placement is None:
-        raise ExportError(asset.name, "3D Tiles need a place on the earth", "give --lonlat LON LAT")
-    vertices = np.concatenate([tile_from_asset().apply(mesh.vertices) for mesh in asset.lods])
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    half = (high - low) / 2 + BOX_MARGIN_M
-    box = [*((low + high) / 2).tolist(), half[0], 0.0, 0.0, 0.0, half[1], 0.0, 0.0, 0.0, half[2]]
-    volume = {"box": [float(value) + 0.0 for value in box]}
+    names = tuple(folder + content_name(asset.name, lod, version) for lod in range(len(asset.lods)))
+    return figure_tile(figure_of(asset, names))
 
-    # A tile's error is that of showing it instead of the finest mesh, and must not grow on the way to finer tiles.
-    errors = np.maximum.accumulate([0.0, *(mesh.deviation_m[1] for mesh in asset.lods[1:])]).tolist()
+
+def figure_tile(figure: PlacedFigure, facts: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The tile of a figure: its coarsest level of detail, refined by REPLACE down to the finest.
+
+    figure : its contents as seen from the tileset
+    facts : what each of its tiles is to have besides, such as metadata
+
+    `transform` takes TILE to ECEF; the box, in the TILE frame, holds every vertex of every level.
+    """
+    centre = [round((low + high) / 2, 6) for low, high in zip(figure.low, figure.high, strict=True)]
+    half = [
+        math.ceil((max(high - middle, middle - low) + BOX_MARGIN_M) * 1e6) / 1e6
+        for low, middle, high in zip(figure.low, centre, figure.high, strict=True)
+    ]
+    box = [*centre, half[0], 0.0, 0.0, 0.0, half[1], 0.0, 0.0, 0.0, half[2]]
+    volume = {"box": [value + 0.0 for value in box]}
     tile: dict[str, Any] = {}
-    for lod, error in enumerate(errors):
-        uri = quote(folder + content_name(asset.name, lod))
+    for uri, error in zip(figure.contents, figure.errors, strict=True):
+        # A tile's error is that of showing it instead of the finest mesh.
         children = {"children": [tile]} if tile else {}
-        tile = {"boundingVolume": volume, "geometricError": error, "content": {"uri": uri}, **children}
-    return {"transform": column_major(ecef_from_tile(asset.placement)), "refine": "REPLACE", **tile}
+        content = {"content": {"uri": quote(uri)}}
+        tile = {"boundingVolume": volume, "geometricError": error, **(facts or {}), **content, **children}
+    # Column by column; adding zero turns -0.0 into 0.0, as the same place must not be written in two ways.
+    transform = (ecef_matrix(figure.placement).T.ravel() + 0.0).tolist()
+    return {"transform": transform, "refine": "REPLACE", **tile}

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from exporters.check_gltf import check_gltf
+from exporters.check_places import check_czml, check_geojson
 from exporters.check_tiles import check_tileset
 from exporters.check_usd import check_usd
 from exporters.errors import ExportError
@@ -21,7 +22,7 @@ __all__ = ["Finding", "read_triangles", "validate"]
 def validate(path: str | os.PathLike[str], external: bool = True) -> list[Finding]:
     """Findings about a file or tileset, worst first; an empty list or nothing but infos is a clean bill.
 
-    path : .glb, .gltf, .usda, .usdc, .usdz, .ply, .obj, a tileset.json or its folder
+    path : .glb, .gltf, .usda, .usdc, .usdz, .ply, .obj, .czml, .geojson, a tileset.json or its folder
     external : for glTF run the Khronos validator too, if Node and the npm package gltf-validator are there
 
     Raises ExportError for a path that is not there or of another kind.
@@ -50,6 +51,10 @@ def _check_any(path: Path, external: bool) -> list[Finding]:
         return check_usd(path)
     if suffix in (".ply", ".obj"):
         return _check_triangles(path)
+    if suffix == ".czml":
+        return check_czml(path)
+    if suffix == ".geojson":
+        return check_geojson(path)
     raise ExportError(path, f"no check for suffix {suffix or 'none'}", "see exporters.write.FORMATS")
 
 

@@ -10,17 +10,20 @@ import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from exporters.asset import Asset
+from exporters.czml import write_czml
 from exporters.errors import ExportError
+from exporters.geojson import write_geojson
 from exporters.glb import write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
-from exporters.tiles import DEFAULT_VISIBLE_FROM_M, content_name, write_tileset
-from exporters.usd import write_usd
+from exporters.profiles import GENERAL, Profile, suffix_of
+from exporters.tiles import DEFAULT_VISIBLE_FROM_M, TilesVersion, content_name, write_tileset
+from exporters.usd import texture_name, write_usd
 
 OutputPath = str | os.PathLike[str]
 
@@ -30,26 +33,36 @@ class Format:
     """A kind of output.
 
     title : for people
-    writer : writes an asset to a path
-    beside : endings, after the stem, of the files written next to the one asked for
+    writer : writes an asset to a path for the client of a profile
+    beside : endings, after the stem, of the files written next to the one asked for; the textures of USD, one for
+        each level of detail, are not among them
+    placed : whether it says nothing without a place on the earth
     """
 
     title: str
-    writer: Callable[[Asset, Path], None]
+    writer: Callable[[Asset, Path, Profile], None]
     beside: tuple[str, ...] = ()
+    placed: bool = False
 
 
 TEXTURE = "_texture.png"
 """Ending of textures beside a model; not `.png` alone, as `figure.png` is usually the drawing itself."""
 
+
+def _same_for_all(writer: Callable[[Asset, Path], None]) -> Callable[[Asset, Path, Profile], None]:
+    return lambda asset, path, profile: writer(asset, path)
+
+
 FORMATS: dict[str, Format] = {
     ".glb": Format("glTF 2.0 binary", write_glb),
     ".gltf": Format("glTF 2.0", write_gltf, (".bin", TEXTURE)),
-    ".usda": Format("OpenUSD text", write_usd, (TEXTURE,)),
-    ".usdc": Format("OpenUSD binary", write_usd, (TEXTURE,)),
-    ".usdz": Format("OpenUSD package", write_usd),
-    ".ply": Format("Stanford PLY", write_ply),
-    ".obj": Format("Wavefront OBJ", write_obj, (".mtl", TEXTURE)),
+    ".usda": Format("OpenUSD text", _same_for_all(write_usd)),
+    ".usdc": Format("OpenUSD binary", _same_for_all(write_usd)),
+    ".usdz": Format("OpenUSD package", _same_for_all(write_usd)),
+    ".ply": Format("Stanford PLY", _same_for_all(write_ply)),
+    ".obj": Format("Wavefront OBJ", _same_for_all(write_obj), (".mtl", TEXTURE)),
+    ".czml": Format("CZML", write_czml, (".glb",), placed=True),
+    ".geojson": Format("GeoJSON", write_geojson, (".glb",), placed=True),
 }
 """File formats by suffix; a folder or a tileset.json means 3D Tiles."""
 
@@ -62,22 +75,46 @@ def is_tileset(path: OutputPath) -> bool:
     return file.is_dir() and file.suffix.lower() not in FORMATS  # such as maps/v1.2
 
 
-def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: str = "", lods: int = 1) -> None:
+def has_levels(path: OutputPath) -> bool:
+    """Whether an output holds all levels of detail of an asset, not the finest alone: 3D Tiles and USD."""
+    return is_tileset(path) or Path(path).suffix.lower().startswith(".usd")
+
+
+def needs_place(path: OutputPath) -> bool:
+    """Whether an output cannot be written without a place on the earth: 3D Tiles, CZML, GeoJSON."""
+    return is_tileset(path) or getattr(FORMATS.get(Path(path).suffix.lower()), "placed", False)
+
+
+def in_order(paths: Iterable[OutputPath]) -> list[OutputPath]:
+    """The outputs of one asset in the order to write them: models before the files that have them beside."""
+    return sorted(paths, key=lambda path: FORMATS.get(Path(path).suffix.lower(), FORMATS[".glb"]).placed)
+
+
+def check_outputs(
+    paths: Iterable[OutputPath],
+    overwrite: bool = False,
+    name: str = "",
+    lods: int = 1,
+    tiles_version: TilesVersion = "1.1",
+    profile: Profile = GENERAL,
+) -> None:
     """Find out before the work begins what would keep outputs from being written.
 
     paths : all outputs of one asset
     overwrite : existing files may be replaced
-    name, lods : of the asset to come, from which the files beside a tileset.json get their names
+    name, lods, tiles_version : of the asset to come, from which the files beside a tileset.json get their names
+    profile : of the client that is to read them
 
-    Raises ExportError naming the first output with an unknown suffix, in a folder that cannot be written to, that
-    exists although `overwrite` is off, or that is asked for twice.
+    Raises ExportError naming the first output with an unknown suffix, that the client does not read, in a folder that
+    cannot be written to, that exists although `overwrite` is off, or that is asked for twice.
     """
     seen: set[str] = set()
     parts: dict[str, Path] = {}
     for path in paths:
         main = _main_file(path)
+        profile.check(os.fspath(path), suffix_of(main))
         check_file(path, main, overwrite)
-        for companion in _companions(path, name, lods):
+        for companion in _companions(path, name, lods, tiles_version, profile):
             if companion.exists() and not overwrite:
                 raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
             parts[os.path.abspath(companion)] = main
@@ -86,39 +123,56 @@ def check_outputs(paths: Iterable[OutputPath], overwrite: bool = False, name: st
             raise ExportError(os.fspath(path), "is asked for twice", "name each output once")
         seen.add(key)
     for key in seen & set(parts):
+        if parts[key].suffix.lower() in (".czml", ".geojson"):
+            continue  # the model beside them is the one that is asked for
         raise ExportError(key, f"is also a part of {parts[key]}", "choose another name or folder for one of them")
 
 
 def write(
-    asset: Asset, path: OutputPath, overwrite: bool = False, visible_from_m: float = DEFAULT_VISIBLE_FROM_M
+    asset: Asset,
+    path: OutputPath,
+    overwrite: bool = False,
+    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    tiles_version: TilesVersion = "1.1",
+    profile: Profile = GENERAL,
 ) -> tuple[Path, ...]:
     """Write an asset in the format that the path names, whole or not at all.
 
     asset : not changed
     path : a file with a suffix of `FORMATS`; a folder or its tileset.json for 3D Tiles. Missing folders are made
     overwrite : replace what is there; in the folder of a tileset only files of the names we write
-    visible_from_m : for 3D Tiles, see `exporters.tiles.write_tileset`
+    visible_from_m, tiles_version : for 3D Tiles, see `exporters.tiles.write_tileset`
+    profile : what the client of the file takes
     returns : the files written, the one that names the others last
 
-    Raises ExportError as `check_outputs` does, and where the disk refuses.
+    Raises ExportError as `check_outputs` does, where the profile needs what is not installed, and where the disk
+    refuses.
     """
     main = _main_file(path)
+    profile.check(os.fspath(path), suffix_of(main))
     check_file(path, main, overwrite)
 
     def fill(stage: Path) -> None:
         if main.name == "tileset.json":
-            write_tileset(asset, stage, visible_from_m)
+            write_tileset(asset, stage, visible_from_m, tiles_version, profile)
         else:
-            FORMATS[main.suffix.lower()].writer(asset, stage / main.name)
+            FORMATS[main.suffix.lower()].writer(asset, stage / main.name, profile)
 
     return write_whole(path, main, fill, overwrite)
 
 
-def write_whole(path: OutputPath, main: Path, fill: Callable[[Path], None], overwrite: bool) -> tuple[Path, ...]:
+def write_whole(
+    path: OutputPath,
+    main: Path,
+    fill: Callable[[Path], None],
+    overwrite: bool,
+    outdated: Iterable[str] = (),
+) -> tuple[Path, ...]:
     """Put the files that `fill` makes in a folder beside `main`, all of them or none; `main` comes last.
 
     path : the output as it was asked for, for messages
-    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others
+    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others, folders too
+    outdated : files beside `main`, slashes between folders, that go where `fill` makes none of their name
     returns : the files written
 
     Raises ExportError where the disk refuses, or a file is there already although `overwrite` is off.
@@ -126,8 +180,9 @@ def write_whole(path: OutputPath, main: Path, fill: Callable[[Path], None], over
     try:
         with _folders(main.parent), _staging(main.parent) as stage:
             fill(stage)
-            names = sorted(file.name for file in stage.iterdir() if file.name != main.name) + [main.name]
-            _put_in_place(stage, main.parent, names, overwrite)
+            files = (file.relative_to(stage).as_posix() for file in stage.rglob("*") if file.is_file())
+            names = sorted(name for name in files if name != main.name) + [main.name]
+            _put_in_place(stage, main.parent, names, overwrite, sorted(set(outdated) - set(names)))
     except OSError as error:
         reason = error.strerror or str(error)
         raise ExportError(os.fspath(path), f"cannot be written ({reason})", "choose another folder") from error
@@ -145,11 +200,16 @@ def _main_file(path: OutputPath) -> Path:
     return file
 
 
-def _companions(path: OutputPath, name: str, lods: int) -> list[Path]:
+def _companions(path: OutputPath, name: str, lods: int, version: TilesVersion, profile: Profile) -> list[Path]:
     if is_tileset(path):
-        return [_main_file(path).with_name(content_name(name, lod)) for lod in range(lods)] if name else []
+        return [_main_file(path).with_name(content_name(name, lod, version)) for lod in range(lods)] if name else []
     file = Path(path)
-    return [file.with_name(file.stem + ending) for ending in FORMATS[file.suffix.lower()].beside]
+    if file.suffix.lower() in (".usda", ".usdc"):
+        return [file.with_name(texture_name(file.stem, lod)) for lod in range(lods)]
+    endings = FORMATS[file.suffix.lower()].beside
+    if file.suffix.lower() == ".gltf":
+        endings = tuple(profile.texture_ending if ending == TEXTURE else ending for ending in endings)
+    return [file.with_name(file.stem + ending) for ending in endings]
 
 
 def check_file(path: OutputPath, main: Path, overwrite: bool) -> None:
@@ -198,26 +258,46 @@ def _staging(folder: Path) -> Iterator[Path]:
         shutil.rmtree(stage, ignore_errors=True)
 
 
-def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool) -> None:
+def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool, outdated: list[str]) -> None:
     """Rename staged files into their folder in this order, or leave the folder as it was."""
-    backup = stage / "replaced"
-    backup.mkdir()
-    kept, new = [], []
+    # Hidden, so that it is no folder of an output.
+    backup = stage / ".replaced"
+    kept, new, made = [], [], []
     try:
         for name in names:
             target = folder / name
+            for parent in reversed(Path(name).parents):
+                if not (folder / parent).exists():
+                    (folder / parent).mkdir()
+                    made.append(folder / parent)
             if target.exists():
                 if not overwrite and target.read_bytes() != (stage / name).read_bytes():
                     # Equal bytes are no conflict: .gltf and .obj of one figure share their texture.
                     raise ExportError(target, "exists already", "use --overwrite or choose another name")
-                shutil.copy2(target, backup / name)
+                _keep(target, backup / name)
                 kept.append(name)
             else:
                 new.append(name)
             os.replace(stage / name, target)
+        for name in outdated:
+            if (folder / name).is_file():
+                _keep(folder / name, backup / name)
+                kept.append(name)
+                (folder / name).unlink()
     except BaseException:
         for name in kept:
             os.replace(backup / name, folder / name)
         for name in new:
             (folder / name).unlink(missing_ok=True)
+        for each in reversed(made):
+            with suppress(OSError):
+                each.rmdir()
         raise
+
+
+def _keep(file: Path, copy: Path) -> None:
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        os.link(file, copy)
+    except OSError:  # file systems without hard links
+        shutil.copy2(file, copy)

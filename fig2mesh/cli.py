@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__, render_cli, view_cli
+from fig2mesh import __version__, render_cli, tileset_cli, view_cli
 from fig2mesh.figure_options import FILE, figure_files, messages, place_options
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
@@ -71,15 +71,26 @@ def cli() -> None:
 )  # fmt: skip
 @click.option(
     "-o", "--output", "outputs", multiple=True, metavar="OUT",
-    help=".glb .gltf .usda .usdc .usdz .ply .obj, or a folder / tileset.json for 3D Tiles; repeatable. "
+    help=".glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson, or a folder / tileset.json for 3D Tiles; repeatable. "
     "Default: FIGURE's stem + .glb in the current folder.",
+)  # fmt: skip
+@click.option(
+    "--profile", type=click.Choice(["cesiumjs", "cesiumjs-ktx2", "blender", "qgis", "omniverse"]),
+    help="Write for one client: cesiumjs compressed (also with KTX 2 texture), blender and qgis without extensions, "
+    "omniverse as binary USD. Default: what every client takes.",
 )  # fmt: skip
 @figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--triangles", type=click.IntRange(200, 2_000_000), metavar="N", help="Triangles of the finest mesh.")
 @click.option("--texture-size", type=click.IntRange(64, 8192), metavar="PX", help="Texels a side.")
-@click.option("--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles).")
+@click.option(
+    "--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles, USD)."
+)
 @click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
+@click.option(
+    "--tiles-version", type=tileset_cli.TILES_VERSION, default="1.1", show_default=True,
+    help="Of 3D Tiles; 1.0: content as .b3dm, for older clients.",
+)  # fmt: skip
 @click.option(
     "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
     help="What depths come from: networks, or rules and the outline alone.",
@@ -187,6 +198,7 @@ def doctor() -> None:
 
 render_cli.add_to(cli)
 view_cli.add_to(cli)
+tileset_cli.add_to(cli)
 data_cli.add_to(cli)
 training_cli.add_to(cli)
 cli.add_command(tradeoff)

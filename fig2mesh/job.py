@@ -14,8 +14,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from exporters.asset import Asset
-from exporters.write import check_outputs, is_tileset, write
+from exporters.asset import Asset, TexturedMesh
+from exporters.profiles import Profile, profile_named
+from exporters.sampling import observed_share
+from exporters.write import check_outputs, has_levels, in_order, is_tileset, needs_place, write
+from fig2mesh import __version__
 from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
@@ -35,6 +38,7 @@ def run(
     *,
     figure: Path,
     outputs: tuple[str, ...],
+    profile: str | None,
     mask: Path | None,
     keypoints: Path | None,
     part_labels: Path | None,
@@ -44,6 +48,7 @@ def run(
     texture_size: int | None,
     lods: int,
     visible_from: float,
+    tiles_version: Any,
     parts: str,
     textures: str | None,
     contours: str,
@@ -77,14 +82,16 @@ def run(
         raise InputError("--resume-from", f"{resume_from} is no stage", f"choose from {', '.join(STAGES)}")
     if resume_from is not None and save_stages is None:
         raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
-    _check_targets(targets, figure.stem, lods, request.somewhere, overwrite)
+    client = profile_named(profile)
+    client.check_tools()
+    _check_targets(targets, figure.stem, lods, request.somewhere, overwrite, tiles_version, client)
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
         check_text(report, overwrite)
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
-    if lods > 1 and resume_from is None and not any(is_tileset(target) for target in targets):
-        log.info("--lods %d: only 3D Tiles have levels of detail; one is made", lods)
+    if lods > 1 and resume_from is None and not any(has_levels(target) for target in targets):
+        log.info("--lods %d: only 3D Tiles and USD have levels of detail; one is made", lods)
         lods = 1
     settings = _settings(
         quality=quality, triangles=triangles, texture_size=texture_size, lods=lods, parts=parts, textures=textures,
@@ -123,12 +130,15 @@ def run(
             part_names=_part_names(levels) if evidence else {},
             copyright=credit,
             lit=settings.light,
-            metadata={"source": figure.name, "seed": settings.seed, "quality": quality, **placed.metadata},
+            metadata={**_metadata(figure, settings.seed, quality, levels[0]), **placed.metadata},
         )
-        for target in targets:
+        for target in in_order(targets):
             advance(f"write {target}")
             start = time.perf_counter()
-            written += write(asset, target, overwrite=overwrite, visible_from_m=visible_from)
+            written += write(
+                asset, target, overwrite=overwrite, visible_from_m=visible_from, tiles_version=tiles_version,
+                profile=client,
+            )  # fmt: skip
             timings.append(Timing(f"write {target}", time.perf_counter() - start, peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]
@@ -212,17 +222,26 @@ def tell(placed: Placed, *more: str | None) -> None:
             log.warning("%s", note)
 
 
-def _check_targets(targets: tuple[str, ...], name: str, lods: int, somewhere: bool, overwrite: bool) -> None:
+def _check_targets(
+    targets: tuple[str, ...],
+    name: str,
+    lods: int,
+    somewhere: bool,
+    overwrite: bool,
+    version: Any,
+    client: Profile,
+) -> None:
     for target in targets:
-        if not somewhere and is_tileset(target):
-            raise OutputError(target, "3D Tiles need a place on earth", "pass --lonlat LON LAT or --map SHEET")
-    check_outputs(targets, overwrite=overwrite, name=name, lods=lods)
+        if not somewhere and needs_place(target):
+            kind = "3D Tiles need" if is_tileset(target) else f"{Path(target).suffix} needs"
+            raise OutputError(target, f"{kind} a place on earth", "pass --lonlat LON LAT or --map SHEET")
+    check_outputs(targets, overwrite=overwrite, name=name, lods=lods, tiles_version=version, profile=client)
 
 
 def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any) -> Plan:
     """What `run` would do with the same options; reads and writes nothing."""
     targets = outputs or (figure.stem + ".glb",)
-    levels = lods if any(is_tileset(target) for target in targets) else 1
+    levels = lods if any(has_levels(target) for target in targets) else 1
     names = ("quality", "triangles", "texture_size", "parts", "textures", "contours", "effects", "mesher", "closing",
              "seed")  # fmt: skip
     return plan(_settings(lods=levels, device="cpu", **{name: options[name] for name in names}), targets)
@@ -249,6 +268,13 @@ def torch_device(name: str) -> str:
     if name == "cuda" and not available:
         raise InputError("--device", "no usable CUDA device", "pass --device cpu or auto")
     return "cuda" if available else "cpu"
+
+
+def _metadata(figure: Path, seed: int, quality: Any, mesh: TexturedMesh) -> dict[str, Any]:
+    """Facts that go with the figure into its files."""
+    facts = {"source": figure.name, "seed": seed, "quality": quality, "version": __version__}
+    share = observed_share(mesh)
+    return facts if share is None else facts | {"observed_share": round(share, 3)}
 
 
 def _part_names(levels: Any) -> dict[int, str]:

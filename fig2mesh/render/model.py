@@ -9,27 +9,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
-from exporters.gltf_reader import read_gltf
+from exporters.errors import ExportError
+from exporters.gltf_reader import MESHOPT, Gltf, read_gltf
 from fig2mesh.measure import load_textured
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
 """Files that are models; everything else is taken for a drawing."""
 
+COMPRESSION = {*MESHOPT, "KHR_draco_mesh_compression", "KHR_texture_basisu"}
+"""Extensions of glTF files that trimesh, which reads models, cannot read."""
+
 
 def read_model(path: Path) -> TexturedMesh:
     """The triangles of a file, ASSET, with colours and part labels where it has them. Raises ExportError."""
-    mesh = load_textured(path)
     if path.suffix.lower() not in (".glb", ".gltf"):
-        return mesh
-    labels = _gltf_labels(path)
+        return load_textured(path)
+    gltf = read_gltf(path)
+    packed = sorted(set(gltf.document.get("extensionsRequired", [])) & COMPRESSION)
+    if packed:
+        raise ExportError(path, f"is compressed ({', '.join(packed)})", "give the file written without --profile")
+    mesh = load_textured(path)
+    labels = _gltf_labels(gltf)
     return replace(mesh, parts=labels) if labels is not None and len(labels) == len(mesh.vertices) else mesh
 
 
-def _gltf_labels(path: Path) -> NDArray[np.uint8] | None:
+def _gltf_labels(gltf: Gltf) -> NDArray[np.uint8] | None:
     """(V,) part label of each vertex, as `exporters.glb` writes them; None in files without."""
-    gltf = read_gltf(path)
     tables = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {}).get("propertyTables", [])
     attributes = gltf.items("meshes")[0]["primitives"][0]["attributes"]
+    if "_PART" in attributes:
+        return gltf.accessor(attributes["_PART"]).astype(np.uint8)
     if "_FEATURE_ID_0" not in attributes or not tables or "label" not in tables[0].get("properties", {}):
         return None
     table = np.frombuffer(gltf.view(tables[0]["properties"]["label"]["values"]), np.uint8)

@@ -25,3 +25,10 @@ def node(node_modules: Path) -> RunScript:
 def tiles_tools() -> RunScript:
     """The same with 3d-tiles-tools: 220 MB, more than a minute to install, hence only for slow tests."""
     return runner(installed(ROOT / "build" / "tiles-tools", "3d-tiles-tools"))
+
+
+@pytest.fixture(scope="session")
+def codecs() -> Path:
+    """The KTX 2 encoder and another reader of compressed glTF: 9 MB."""
+    names = ("ktx2-encoder", "meshoptimizer", "@gltf-transform/core", "@gltf-transform/extensions", "gltf-validator")
+    return installed(ROOT / "build" / "codecs", *names)

@@ -9,11 +9,12 @@ import pytest
 
 from exporters.errors import ExportError
 from exporters.inspect import inspect
+from exporters.tileset_files import write_figures
 from exporters.write import FORMATS, write
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import EXACT_VOLUME, ZURICH, asset, capsule
 
-FACTS = ["a.glb", "a.gltf", "a.usda", "a.usdc", "a.usdz", "a.ply", "a.obj", "tiles"]
+FACTS = ["a.glb", "a.gltf", "a.usda", "a.usdc", "a.usdz", "a.ply", "a.obj", "a.czml", "a.geojson", "tiles"]
 
 
 @pytest.mark.parametrize("name", FACTS)
@@ -48,12 +49,31 @@ def test_levels_of_detail_of_a_tileset(tmp_path: Path) -> None:
     assert [lod["geometric_error_m"] for lod in lods] == [mesh.deviation_m[1] for mesh in asset().lods]
 
 
-@pytest.mark.parametrize("name", FACTS[:-1])
+@pytest.mark.parametrize("name", ["a.usda", "a.usdc", "a.usdz"])
+def test_levels_of_detail_of_usd(tmp_path: Path, name: str) -> None:
+    write(asset(ZURICH), tmp_path / name)
+    lods = inspect(tmp_path / name)["lods"]
+    assert [lod["variant"] for lod in lods] == ["LOD0", "LOD1", "LOD2"]
+    assert [lod["triangles"] for lod in lods] == [len(mesh.faces) for mesh in asset().lods]
+    assert all(lod["solid"] and lod["texture_px"] == [64, 64] for lod in lods)
+
+
+def test_tilesets_and_maps_of_many_say_how_many(tmp_path: Path) -> None:
+    for number in range(3):
+        write(asset(ZURICH, lods=(capsule(8, 2),)), tmp_path / "in" / f"{number}.glb")
+    write_figures([tmp_path / "in"], tmp_path / "out")
+    for name in ("tileset.json", "index.geojson", "figures.czml"):
+        facts = inspect(tmp_path / "out" / name)
+        assert facts["metadata"] == {"figures": 3}
+        assert facts["files"] == {name: (tmp_path / "out" / name).stat().st_size}
+
+
+@pytest.mark.parametrize("name", FACTS[:-3])
 def test_without_a_place_there_is_none(tmp_path: Path, name: str) -> None:
     write(asset(copyright="", metadata={}), tmp_path / name)
     facts = inspect(tmp_path / name)
     assert facts["placement"] is None
-    assert facts["lods"] is None
+    assert facts["lods"] is None or name.startswith("a.usd")
 
 
 def test_the_place_of_a_tileset_is_what_its_transform_does(tmp_path: Path) -> None:

@@ -101,6 +101,46 @@ def test_the_figure_is_turned_to_its_heading(tmp_path: Path, heading: float) -> 
     assert nose_bearing_deg(Transform(ENU, ASSET, enu_from_stage @ matrix)) == pytest.approx(heading, abs=1e-9)
 
 
+def test_levels_of_detail_are_variants(stage: Usd.Stage) -> None:
+    figure = stage.GetDefaultPrim()
+    variants = figure.GetVariantSets().GetVariantSet("LOD")
+    assert variants.GetVariantNames() == ["LOD0", "LOD1", "LOD2"]
+    assert variants.GetVariantSelection() == "LOD0"  # what a viewer shows that knows no variants
+    files = set()
+    for name, given in zip(variants.GetVariantNames(), asset().lods, strict=True):
+        variants.SetVariantSelection(name)
+        mesh = UsdGeom.Mesh.Get(stage, "/Figure/Mesh")
+        assert len(mesh.GetFaceVertexCountsAttr().Get()) == len(given.faces)
+        # Bounds as viewers reckon them to frame the figure: from the extent of the selected level.
+        bounds = UsdGeom.BBoxCache(0, ["default"]).ComputeUntransformedBound(figure).GetRange()
+        assert np.array_equal(bounds.GetMin(), given.vertices.min(axis=0))
+        assert np.array_equal(bounds.GetMax(), given.vertices.max(axis=0))
+        material = UsdShade.MaterialBindingAPI(mesh.GetPrim()).ComputeBoundMaterial()[0]
+        source, _, _ = material.ComputeSurfaceSource()[0].GetInput("diffuseColor").GetConnectedSource()
+        files.add(UsdShade.Shader(source.GetPrim()).GetInput("file").Get().resolvedPath)
+        subsets = UsdGeom.Subset.GetGeomSubsets(mesh, "face", "part")
+        assert sum(len(subset.GetIndicesAttr().Get()) for subset in subsets) == len(given.faces)
+    assert "" not in files
+    assert len(files) == 3  # each level has a texture of its own
+
+
+def test_one_level_needs_no_variants(tmp_path: Path) -> None:
+    write_usd(asset(lods=(capsule(),)), tmp_path / "a.usda")
+    assert "variant" not in (tmp_path / "a.usda").read_text()
+
+
+def test_a_figure_can_be_referenced_into_another_stage(stage: Usd.Stage) -> None:
+    city = Usd.Stage.CreateInMemory()
+    farmer = city.DefinePrim("/City/Farmer")
+    farmer.GetReferences().AddReference(stage.GetRootLayer().realPath)
+    assert farmer.GetVariantSets().GetNames() == ["LOD"]
+    farmer.GetVariantSets().SetSelection("LOD", "LOD1")
+    mesh = UsdGeom.Mesh.Get(city, "/City/Farmer/Mesh")
+    assert len(mesh.GetFaceVertexCountsAttr().Get()) == len(asset().lods[1].faces)
+    assert UsdShade.MaterialBindingAPI(mesh.GetPrim()).ComputeBoundMaterial()[0]
+    assert farmer.GetAttribute("cesium:anchor:longitude").Get() == 8.5417
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize(
     "mesh",
@@ -140,7 +180,7 @@ def test_package_is_stored_aligned_and_undated(tmp_path: Path) -> None:
     write_usd(asset(), path)
     data = path.read_bytes()
     with zipfile.ZipFile(path) as archive:
-        assert archive.namelist() == ["figure.usdc", "texture.png"]
+        assert archive.namelist() == ["figure.usdc", *(f"figure{lod}_texture.png" for lod in ("", "_lod1", "_lod2"))]
         for member in archive.infolist():
             header = data[member.header_offset : member.header_offset + 30]
             start = (

@@ -27,7 +27,7 @@ class Run:
         return self.folder / "out" / name
 
 
-OUTPUTS = ("a.glb", "b/tileset.json", "c.usdz", "d.ply", "e.obj", "f.gltf", "g.usda")
+OUTPUTS = ("a.czml", "a.glb", "b/tileset.json", "c.usdz", "d.ply", "e.obj", "f.gltf", "g.usda", "h.geojson")
 
 
 @pytest.fixture(scope="session")

@@ -56,6 +56,9 @@ BAD = {
     "tiles without place": (("-o", "tiles/tileset.json"), "--lonlat"),
     "same output twice": (("-o", "a.glb", "-o", "./a.glb"), "twice"),
     "part of another output": (("--lonlat", "8", "47", "-o", "t/tileset.json", "-o", "t/drawn.glb"), "also a part"),
+    "not for the client": (("--profile", "cesiumjs", "-o", "a.usda"), "CesiumJS is to read"),
+    "tiles for Blender": (("--lonlat", "8", "47", "--profile", "blender", "-o", "t/"), "Blender is to read"),
+    "no such client": (("--profile", "maya"), "maya"),
     "long name": (("-o", "a" * 300 + ".glb"), "too long"),
     "altitude": (("--lonlat", "8", "47", "--altitude", "1e300"), "--altitude"),
     "visible from": (("--visible-from", "-5"), "--visible-from"),
@@ -138,3 +141,30 @@ def test_stage_names_of_the_help_are_the_pipelines() -> None:
     from fig2mesh.pipeline import steps
 
     assert [step.name for step in steps(PRESETS["draft"], 1.79)] == list(STAGES)
+
+
+def test_profiles_of_the_help_are_those_of_the_writers() -> None:
+    from exporters.profiles import PROFILES
+    from fig2mesh.cli import make
+
+    (option,) = (each for each in make.params if each.name == "profile")
+    assert list(option.type.to_info_dict()["choices"]) == list(PROFILES)
+
+
+def test_a_missing_encoder_is_said_before_the_work(
+    files: DrawnFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "meshopt", None)
+    assert main(arguments(files, "--profile", "cesiumjs", "-o", str(tmp_path / "a.glb"))) == 2
+    said = capfd.readouterr().err.strip()
+    assert said == (
+        'fig2mesh: --profile: compression needs the package meshopt; pip install "fig2mesh[compression]"'
+    )  # fmt: skip
+    assert not (tmp_path / "a.glb").exists()
+
+
+@pytest.mark.parametrize("name", ["a.czml", "a.geojson"])
+def test_places_need_a_place(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert main(["figure.png", "-o", str(tmp_path / name)]) == 2
+    suffix = Path(name).suffix
+    assert f"{suffix} needs a place on earth; pass --lonlat LON LAT" in capsys.readouterr().err

@@ -184,6 +184,16 @@ def test_resuming_gives_the_same_model(finished: Run, tmp_path: Path) -> None:
     assert {stage["stage"] for stage in stages if not stage["run"]} == {"lift", "parts", "cloud", "solid", "simplify"}
 
 
+def test_tiles_for_older_clients(finished: Run, tmp_path: Path) -> None:
+    arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--lonlat", *ZURICH]
+    arguments += ["--facing", "NE", "--quality", "draft", "--lods", "2", "--height-m", "2.5", "--tiles-version", "1.0"]
+    arguments += ["--save-stages", str(finished.folder / "stages"), "--resume-from", "unwrap", "-q"]
+    assert main([*arguments, "-o", str(tmp_path / "b")]) == 0
+    assert sorted({path.suffix for path in (tmp_path / "b").iterdir()}) == [".b3dm", ".json"]
+    assert [each for each in validate(tmp_path / "b", external=False) if each.severity != "info"] == []
+    assert main(["validate", str(tmp_path / "b")]) == 0
+
+
 @pytest.mark.parametrize("option", [("--mesher", "isosurface"), ("--closing", "fill")])
 def test_other_ways_to_a_solid(finished: Run, tmp_path: Path, option: tuple[str, str]) -> None:
     target = tmp_path / "other.glb"

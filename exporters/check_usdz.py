@@ -1,0 +1,50 @@
+"""Checks of the package around a .usdz file.
+
+https://openusd.org/release/spec_usdz.html
+"""
+
+from __future__ import annotations
+
+import struct
+import zipfile
+from pathlib import Path, PurePosixPath
+
+from exporters.findings import Finding
+
+LAYERS = (".usd", ".usda", ".usdc")
+ALLOWED = (*LAYERS, ".png", ".jpg", ".jpeg", ".exr", ".avif", ".m4a", ".mp3", ".wav")
+ALIGNMENT = 64
+
+
+def check_usdz(path: Path) -> list[Finding]:
+    """Findings about the archive: its first file is a layer, all are stored, plain and aligned, of allowed types."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+            broken = archive.testzip()
+    except (zipfile.BadZipFile, OSError) as error:
+        return [Finding("error", "UNREADABLE", f"no readable archive ({error})", path.name)]
+    findings = []
+
+    def note(name: str, message: str) -> None:
+        findings.append(Finding("error", "PACKAGE", message, f"{path.name}[{name}]"))
+
+    if broken is not None:
+        note(broken, "is damaged")
+    if not members or PurePosixPath(members[0].filename).suffix.lower() not in LAYERS:
+        note(members[0].filename if members else "", "the first file is no layer")
+    with path.open("rb") as stream:
+        for member in members:
+            if member.compress_type != zipfile.ZIP_STORED:
+                note(member.filename, "is compressed")
+            if member.flag_bits & 1:
+                note(member.filename, "is encrypted")
+            if PurePosixPath(member.filename).suffix.lower() not in ALLOWED:
+                note(member.filename, "is of a type that packages may not hold")
+            # The local header, not the directory's, says where the data begins.
+            stream.seek(member.header_offset + 26)
+            name, extra = struct.unpack("<2H", stream.read(4))
+            start = member.header_offset + 30 + name + extra
+            if start % ALIGNMENT:
+                note(member.filename, f"begins at byte {start}, no multiple of {ALIGNMENT}")
+    return findings

@@ -1,0 +1,45 @@
+"""Facts that are found the same way in files of all formats."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from exporters.ktx2 import IDENTIFIER, size_of
+from exporters.solid import measure_topology
+
+
+def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
+    """Size and topology of triangles; vertices : (V, 3) in the frame of the file, seams undone; faces : (F, 3)."""
+    if not len(faces):
+        return {"triangles": 0}
+    found = measure_topology(vertices, faces)
+    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
+    return {
+        "triangles": len(faces),
+        "bounds_m": [low.tolist(), high.tolist()],
+        "size_m": (high - low).tolist(),
+        "watertight": found.closed,
+        "solid": found.solid,
+        "components": found.components,
+        "genus": found.genus,
+        "volume_m3": found.volume,
+    }
+
+
+def file_sizes(*paths: Path) -> dict[str, int]:
+    """Bytes of the files that are there, by name."""
+    return {path.name: path.stat().st_size for path in paths if path.is_file()}
+
+
+def texture_size(data: bytes) -> list[int]:
+    """Width and height of an image file."""
+    from PIL import Image
+
+    if data.startswith(IDENTIFIER):
+        return list(size_of(data))
+    with Image.open(io.BytesIO(data)) as image:
+        return [image.width, image.height]

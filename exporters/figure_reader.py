@@ -1,0 +1,190 @@
+"""Figures with their places out of files: a .glb, the tileset of one figure or of many, a folder of such."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.b3dm import part_table
+from exporters.errors import ExportError
+from exporters.georeference import placement_of_record
+from exporters.glb_container import open_glb
+from exporters.gltf_reader import Gltf
+from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
+from georef.geodesy import tile_from_asset
+
+SAME_PLACE_M = 1e-3
+"""A tile's transform and the place recorded in its content may differ by this much: the project's promise."""
+
+INTEGER_SCALES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
+
+PICKS = np.array(list(itertools.product((0, 1), repeat=3)))
+"""(8, 3): for each corner of a box, which of its two ends along each axis."""
+
+Box = NDArray[np.float64]
+
+
+def read_figures(path: Path) -> Iterator[PlacedFigure]:
+    """The figures in a file or folder, their contents as absolute paths, in the order of their names.
+
+    path : a .glb; a tileset.json that `fig2mesh` wrote, 3D Tiles 1.1, or its folder; or a folder that holds any
+        number of those at any depth. Of a folder with a tileset, only what the tileset names is read
+
+    Raises ExportError naming the file that has no place, or cannot be read.
+    """
+    if not path.exists():
+        raise ExportError(path, "is not there", "check the name")
+    if path.is_dir():
+        if (path / "tileset.json").is_file():
+            yield from _tileset(path / "tileset.json", frozenset())
+            return
+        for each in sorted(path.iterdir()):
+            hidden = each.name.startswith(".")
+            folder = each.is_dir() and not each.is_symlink()  # links could lead back up
+            if not hidden and (folder or each.suffix.lower() == ".glb"):
+                yield from read_figures(each)
+    elif path.suffix.lower() == ".glb":
+        yield read_figure(path)
+    elif path.suffix.lower() == ".json":
+        yield from _tileset(path, frozenset())
+    else:
+        raise ExportError(path, "is no figure that a tileset can hold", "give .glb files, tilesets or folders of them")
+
+
+def read_figure(path: Path) -> PlacedFigure:
+    """The record of one .glb file, its one content. Raises ExportError where it has no place or is no glTF."""
+    gltf = open_glb(path)
+    asset = gltf.document.get("asset", {})
+    extras = asset.get("extras", {}) if isinstance(asset, dict) else {}
+    record = extras.get("georeference") if isinstance(extras, dict) else None
+    if not isinstance(record, dict):
+        raise ExportError(path, "has no place on the earth", "make it with --lonlat LON LAT")
+    try:
+        placement = placement_of_record(record)
+        low, high = _bounds(gltf)
+        table = part_table(gltf)
+        shares = [float(share) for share in table.get("observedShare", [])]
+        metadata = extras.get("metadata", {})
+        return PlacedFigure(
+            name=next((str(node["name"]) for node in gltf.items("nodes") if node.get("name")), path.stem),
+            placement=placement,
+            low=vector(low),
+            high=vector(high),
+            contents=(os.path.abspath(path),),
+            errors=(0.0,),
+            source=str(metadata.get("source", "")),
+            copyright=str(asset.get("copyright", "")),
+            parts=tuple(map(str, table.get("name", []))),
+            shares=tuple(round(share, 4) for share in shares),
+            observed=_observed(gltf, np.array(shares)) if shares else None,
+        )
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        if isinstance(error, ExportError):
+            raise
+        raise ExportError(path, f"broken glTF ({' '.join(str(error).split())[:120]})", "see validate") from error
+
+
+def _bounds(gltf: Gltf) -> tuple[Box, Box]:
+    """Corners, in the TILE frame, of a box round all meshes of the scene.
+
+    From the accessors' min and max, which glTF demands, so compressed files need not be unpacked.
+    """
+    corners = []
+    for mesh, matrix in gltf.instances():
+        for primitive in gltf.items("meshes")[mesh]["primitives"]:
+            accessor = gltf.items("accessors")[primitive["attributes"]["POSITION"]]
+            ends = np.array([accessor["min"], accessor["max"]], dtype=np.float64)
+            if accessor.get("normalized"):
+                ends = np.maximum(ends / INTEGER_SCALES[accessor["componentType"]], -1.0)
+            corners.append(ends[PICKS, [0, 1, 2]] @ matrix[:3, :3].T + matrix[:3, 3])
+    if not corners:
+        raise ValueError("no mesh in its scene")
+    points = tile_from_asset().apply(np.concatenate(corners))
+    if not np.isfinite(points).all():
+        raise ValueError("vertices that are not finite")
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _observed(gltf: Gltf, shares: NDArray[np.float64]) -> float | None:
+    """Share of the whole surface that the drawing showed, by area; None where the mesh is compressed."""
+    used = gltf.document.get("extensionsUsed", [])
+    if len(gltf.items("meshes")) != 1 or any("compression" in each or "quantization" in each for each in used):
+        return None
+    primitive = gltf.items("meshes")[0]["primitives"][0]
+    positions, faces = gltf.mesh_arrays()
+    rows = gltf.accessor(primitive["attributes"]["_FEATURE_ID_0"]).astype(np.int64)
+    first, second, third = rows[faces].T
+    # A triangle belongs to the part that two of its corners carry, as in exporters.sampling.
+    values = shares[np.where(second == third, second, first)]
+    return area_mean(values, positions[faces].astype(np.float64))
+
+
+def _tileset(path: Path, chain: frozenset[Path]) -> Iterator[PlacedFigure]:
+    from exporters.check_tiles import read_tileset
+
+    document = read_tileset(path)
+    if path.resolve() in chain:
+        raise ExportError(path, "contains itself", "see validate")
+    yield from _tiles(document["root"], path, chain | {path.resolve()})
+
+
+def _tiles(tile: dict[str, Any], path: Path, chain: frozenset[Path]) -> Iterator[PlacedFigure]:
+    if "transform" in tile:
+        yield _figure_of_tiles(tile, path)
+        return
+    uri = tile.get("content", {}).get("uri", "")
+    if uri.lower().endswith(".json"):
+        yield from _tileset(path.parent / unquote(uri), chain)
+    elif uri:
+        raise ExportError(path, f"has no place for {uri}", "give the .glb files that were made with --lonlat")
+    for child in tile.get("children", []):
+        yield from _tiles(child, path, chain)
+
+
+def _figure_of_tiles(tile: dict[str, Any], path: Path) -> PlacedFigure:
+    """The figure of a tile with a transform: its levels are the tile and the one child of each."""
+    levels: list[tuple[Path, float]] = []
+    below: dict[str, Any] | None = tile
+    while below is not None:
+        content, children = below.get("content", {}), below.get("children", [])
+        uri = unquote(content.get("uri", ""))
+        if not uri.lower().endswith(".glb") or len(children) > 1:
+            found = f"content {uri!r} with {len(children)} finer tiles is no level of a figure"
+            raise ExportError(path, found, "give the .glb files instead")
+        levels.append((path.parent / uri, float(below["geometricError"])))
+        below = children[0] if children else None
+    records = [read_figure(file) for file, _ in reversed(levels)]
+    finest = records[0]
+    matrix = np.asarray(tile["transform"], dtype=np.float64).reshape(4, 4).T
+    away = float(np.linalg.norm(ecef_matrix(finest.placement)[:3, 3] - matrix[:3, 3]))
+    if away > SAME_PLACE_M:
+        raise ExportError(
+            path, f"puts {levels[-1][0].name} {away:.3g} m from the place recorded in it", "write it anew"
+        )
+    return PlacedFigure(
+        name=finest.name,
+        placement=finest.placement,
+        low=vector(np.min([record.low for record in records], axis=0)),
+        high=vector(np.max([record.high for record in records], axis=0)),
+        contents=tuple(record.contents[0] for record in records),
+        errors=monotone_errors([0.0, *(error for _, error in levels[-2::-1])]),
+        source=finest.source,
+        copyright=finest.copyright,
+        parts=finest.parts,
+        shares=finest.shares,
+        observed=finest.observed,
+    )
+
+
+def describe(figure: PlacedFigure) -> str:
+    """Everything a record says but where its contents are, as text: equal figures have equal descriptions."""
+    values = {name: getattr(figure, name) for name in figure.__dataclass_fields__ if name != "contents"}
+    return json.dumps(values | {"placement": vars(figure.placement)}, sort_keys=True, default=str)

@@ -1,0 +1,113 @@
+"""A figure with a place, as a tileset of many needs it: a light record, its meshes left on the disk."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.asset import Asset
+from exporters.errors import ExportError
+from exporters.sampling import face_parts, observed_shares
+from georef.geodesy import ecef_from_tile, tile_from_asset
+from georef.placement import GeoPlacement
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedFigure:
+    """What a tileset says about a figure; about 1 kB, so that 100,000 of them fit into memory.
+
+    name : as people know it; need not be unique
+    placement : where it stands
+    low, high : corners of the box round all levels of detail, TILE frame, metres
+    contents : one file per level of detail, finest first: paths with slashes, seen from the tileset's folder, or
+        wherever they are before they are copied there
+    errors : per level, the largest distance to the finest surface, metres; the first is 0
+    source : the picture it was made from, "" if unknown
+    copyright : attribution line, may be empty
+    parts : names of its body parts
+    shares : per part, the share of its surface that the drawing itself showed; empty if unknown
+    observed : the same share for the whole surface; None if unknown
+    """
+
+    name: str
+    placement: GeoPlacement
+    low: Vector
+    high: Vector
+    contents: tuple[str, ...]
+    errors: tuple[float, ...]
+    source: str = ""
+    copyright: str = ""
+    parts: tuple[str, ...] = ()
+    shares: tuple[float, ...] = ()
+    observed: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.contents or len(self.contents) != len(self.errors):
+            raise ValueError(f"{self.name}: {len(self.contents)} contents with {len(self.errors)} errors")
+
+
+def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
+    """The record of an asset in memory.
+
+    asset : with a placement; `deviation_m` of its levels becomes the errors
+    contents : where its levels of detail are or will be, finest first
+
+    Raises ExportError for an asset without a placement.
+    """
+    if asset.placement is None:
+        raise ExportError(asset.name, "3D Tiles need a place on the earth", "give --lonlat LON LAT")
+    vertices = np.concatenate([tile_from_asset().apply(mesh.vertices) for mesh in asset.lods])
+    mesh = asset.mesh
+    shares = observed_shares(mesh) or {}
+    labels = [] if mesh.parts is None else np.unique(mesh.parts).tolist()
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    return PlacedFigure(
+        name=asset.name,
+        placement=asset.placement,
+        low=vector(vertices.min(axis=0)),
+        high=vector(vertices.max(axis=0)),
+        contents=contents,
+        errors=monotone_errors([0.0, *(mesh.deviation_m[1] for mesh in asset.lods[1:])]),
+        source=str(asset.metadata.get("source", "")),
+        copyright=asset.copyright,
+        parts=tuple(asset.part_names.get(label, f"part_{label}") for label in labels),
+        shares=tuple(round(shares[label], 4) for label in labels) if shares else (),
+        observed=_mean_share(shares, face_parts(mesh), corners) if shares else None,
+    )
+
+
+def _mean_share(shares: dict[int, float], faces: NDArray[Any], corners: NDArray[np.float64]) -> float:
+    by_label = np.zeros(256)
+    by_label[list(shares)] = list(shares.values())
+    return area_mean(by_label[faces], corners)
+
+
+def area_mean(values: NDArray[np.float64], corners: NDArray[np.float64]) -> float:
+    """Mean of (F,) values of triangles by their area, rounded to 4 digits; corners : (F, 3, 3) any unit."""
+    (ax, ay, az), (bx, by, bz) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    area = np.sqrt((ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2)
+    total = float(area.sum())
+    return round(float(area @ values) / total, 4) if total else 0.0
+
+
+@functools.lru_cache(maxsize=1 << 17)
+def ecef_matrix(placement: GeoPlacement) -> NDArray[np.float64]:
+    """(4, 4) ECEF from TILE, read-only; kept, as box, transform and orientation of 100,000 figures need it each."""
+    return ecef_from_tile(placement).matrix
+
+
+def vector(values: NDArray[np.float64]) -> Vector:
+    """Three numbers of an array as a tuple of Python floats."""
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+def monotone_errors(errors: list[float]) -> tuple[float, ...]:
+    """Errors of levels, finest first, none below that of a finer one: what tiles must have to be refined at all."""
+    return tuple(np.maximum.accumulate(errors).tolist())

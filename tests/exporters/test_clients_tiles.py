@@ -1,0 +1,207 @@
+"""Programs of others read many figures: CesiumJS, 3d-tiles-tools, py3dtiles."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exporters.tiles import write_tileset
+from exporters.tileset_files import write_figures
+from exporters.tileset_tree import tileset_documents
+from exporters.write import write
+from georef.geodesy import ecef_from_geodetic, ecef_from_tile
+from georef.placement import GeoPlacement
+from tests.exporters.analytic import ZURICH, asset, capsule
+from tests.exporters.test_clients import HEADINGS, PLACES
+from tests.exporters.test_tileset_tree import HIGH, LOW, crowd
+from tests.node import ROOT, RunScript
+
+PY3DTILES = "12.1.1"
+
+SMALL = (capsule(8, 2),)
+
+
+@pytest.fixture(scope="session")
+def py3dtiles() -> Callable[[Path], Any]:
+    """What tests/clients/py3dtiles_read.py prints; in an environment of its own, as it wants an older NumPy."""
+    folder = ROOT / "build" / "py3dtiles"
+    python = folder / ("Scripts" if sys.platform == "win32" else "bin") / "python"
+    version = "import importlib.metadata as m; print(m.version('py3dtiles'))"
+    known = subprocess.run([python, "-c", version], capture_output=True, text=True) if python.exists() else None
+    if known is None or known.stdout.strip() != PY3DTILES:
+        pip = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", f"py3dtiles=={PY3DTILES}"]
+        for command in ([sys.executable, "-m", "venv", folder], pip):
+            done = subprocess.run(command, capture_output=True, text=True)
+            if done.returncode:
+                pytest.skip(f"py3dtiles cannot be installed: {done.stderr.strip()[-200:]}")
+
+    def read(tileset: Path) -> Any:
+        script = ROOT / "tests" / "clients" / "py3dtiles_read.py"
+        done = subprocess.run([python, script, tileset], capture_output=True, text=True, check=True)
+        return json.loads(done.stdout)
+
+    return read
+
+
+@pytest.fixture
+def four(tmp_path: Path) -> Path:
+    """A folder of four figures, one of them in three levels of detail, in the sea and at the pole too."""
+    for number, (lon, lat, height) in enumerate([(8.5, 47.4, 400.0), (180.0, 10.0, 0.0), (0.0, 90.0, 2.0)]):
+        place = GeoPlacement(lon, lat, height, heading_deg=30.0 * number)
+        write(asset(place, lods=SMALL, name=f"figure {number}"), tmp_path / "in" / f"{number}.glb")
+    write(asset(ZURICH, name="farmer"), tmp_path / "in" / "tiles")
+    return tmp_path / "in"
+
+
+def _distance(points: np.ndarray, place: GeoPlacement) -> float:
+    """From the nearest of points, ECEF, to a figure's box with its millimetre."""
+    local = ecef_from_tile(place).inverse().apply(points)
+    gap = np.maximum(np.maximum(np.array(LOW) - 1e-3 - local, local - np.array(HIGH) - 1e-3), 0)
+    return float(np.linalg.norm(gap, axis=-1).min())
+
+
+@pytest.mark.parametrize("visible_from", [100.0, 2000.0, 300_000.0])
+def test_cesium_draws_just_the_figures_within_the_distance(
+    tmp_path: Path, node: RunScript, visible_from: float
+) -> None:
+    figures = crowd(700, spread_deg=visible_from / 111e3 * 2)
+    for name, document in tileset_documents(figures, visible_from):
+        (tmp_path / name).write_text(json.dumps(document))
+    random = np.random.default_rng(5)
+    views = [
+        {"lon_deg": 8.5 + x * visible_from / 111e3, "lat_deg": 47.4 + y * visible_from / 111e3,
+         "height_m": 5000 + z * visible_from}
+        for x, y, z in random.uniform([-2, -2, 0], [2, 2, 0.9], (12, 3)).tolist()
+    ]  # fmt: skip
+    first = figures[0].placement
+    views.append({"lon_deg": first.lon_deg, "lat_deg": first.lat_deg, "height_m": first.height_m + visible_from / 2})
+    views.append({"lon_deg": -170.0, "lat_deg": -40.0, "height_m": 10.0})
+    found = node("visible.mjs", stdin={"tileset": str(tmp_path / "tileset.json"), "views": views})["views"]
+    for view, seen in zip(views, found, strict=True):
+        camera = ecef_from_geodetic([[view["lon_deg"], view["lat_deg"], view["height_m"]]])
+        away = {each.contents[0]: _distance(camera, each.placement) for each in figures}
+        # Drawn from where 16 pixels are one of 1080 rows at 60 degrees across, to float32's digits of nothing here.
+        assert set(seen["drawn"]) == {uri for uri, distance in away.items() if distance < visible_from * (1 - 1e-9)}
+    assert found[-1] == {"drawn": [], "files": 0, "visited": 0}
+    assert found[-2]["drawn"]
+    # Nor is the rest of the tree looked through: 700 figures, 101 nodes above them.
+    assert all(seen["visited"] < 801 for seen in found)
+
+
+def test_levels_of_detail_follow_their_errors_in_cesium(tmp_path: Path, node: RunScript) -> None:
+    given = asset(ZURICH)
+    write_tileset(given, tmp_path, visible_from_m=2000.0)
+    write(given, tmp_path / "in")
+    write_figures([tmp_path / "in"], tmp_path / "many")
+    errors = [mesh.deviation_m[1] for mesh in given.lods]
+    # Just within and beyond the distances at which each level's error is 16 pixels, above the head; and the whole.
+    ranges = [103.923 * errors[1], 103.923 * errors[2], 2000.0]
+    heights = [distance + change for distance in ranges for change in (-0.01, 0.01)]
+    views = [
+        {"lon_deg": ZURICH.lon_deg, "lat_deg": ZURICH.lat_deg, "height_m": ZURICH.height_m + 1.801 + height}
+        for height in heights
+    ]
+    wanted = ["farmer.glb", "farmer_lod1.glb", "farmer_lod1.glb", "farmer_lod2.glb", "farmer_lod2.glb", None]
+    for folder, prefix in ((tmp_path, ""), (tmp_path / "many", "figures/")):
+        found = node("visible.mjs", stdin={"tileset": str(folder / "tileset.json"), "views": views})["views"]
+        names = [[prefix + name] if name else [] for name in wanted]
+        assert [seen["drawn"] for seen in found] == names
+
+
+def test_cesium_reads_the_metadata(four: Path, tmp_path: Path, node: RunScript) -> None:
+    write_figures([four], tmp_path / "out")
+    view = {"lon_deg": 0, "lat_deg": 0, "height_m": 0}
+    found = node("visible.mjs", stdin={"tileset": str(tmp_path / "out" / "tileset.json"), "views": [view]})["metadata"]
+    assert len(found) == 6
+    for level in ("", "_lod1", "_lod2"):
+        facts = found[f"figures/farmer{level}.glb"]
+        assert facts["name"] == "farmer"
+        assert facts["parts"] == ["torso", "head", "l_upper_leg"]
+        assert (facts["longitude"], facts["latitude"], facts["height"]) == (8.5417, 47.3769, 455.34)
+        assert facts["observedShare"] == pytest.approx(0.5, abs=0.01)
+
+
+def test_cesium_puts_entities_of_czml_where_they_were_asked_for(tmp_path: Path, node: RunScript) -> None:
+    wanted = {}
+    for place, (lon, lat, height) in PLACES.items():
+        for heading in HEADINGS:
+            name = f"{place} {heading}"
+            wanted[name] = GeoPlacement(lon, lat, height, heading_deg=heading)
+            write(asset(wanted[name], lods=(capsule(6, 2),), name=name), tmp_path / "in" / f"{name}.glb")
+    write_figures([tmp_path / "in"], tmp_path / "out")
+    found = node("czml.mjs", stdin=str(tmp_path / "out" / "figures.czml"))
+    assert {each["name"] for each in found} == set(wanted)
+    for each in found:
+        place = wanted[each["name"]]
+        feet = ecef_from_geodetic([place.lon_deg, place.lat_deg, place.height_m])
+        assert np.linalg.norm(feet - each["position"]) < 1e-3, each
+        assert abs((each["bearing_deg"] - place.heading_deg + 180) % 360 - 180) < 0.01, each
+        assert abs(each["tilt_deg"]) < 0.001, each
+        assert each["upright"] == pytest.approx(1)
+        assert each["model"].endswith(".glb")
+        assert each["height_reference"] == "NONE"
+
+
+def test_cesium_clamps_entities_of_czml(tmp_path: Path, node: RunScript) -> None:
+    references = []
+    for height in (0.0, 3.0):
+        place = GeoPlacement(8.5, 47.4, height, altitude_mode="clamp", heading_deg=70.0)
+        write(asset(place, lods=SMALL), tmp_path / f"{height}.czml")
+        (found,) = node("czml.mjs", stdin=str(tmp_path / f"{height}.czml"))
+        references.append(found["height_reference"])
+        assert found["bearing_deg"] == pytest.approx(70.0, abs=0.01)
+        assert found["height_m"] == pytest.approx(height, abs=1e-6)
+    assert references == ["CLAMP_TO_GROUND", "RELATIVE_TO_GROUND"]
+
+
+@pytest.mark.slow
+def test_tiles_tools_reads_structure_and_metadata_of_many(tmp_path: Path, tiles_tools: RunScript) -> None:
+    figures = crowd(600, spread_deg=1.0)
+    for name, document in tileset_documents(figures, 2000.0):
+        (tmp_path / name).write_text(json.dumps(document))
+    (tmp_path / "figures").mkdir()
+    for each in figures:
+        (tmp_path / each.contents[0]).write_bytes(b"glTF")
+    found = tiles_tools("tiles_tools_many.mjs", tmp_path / "tileset.json")
+    assert found["metadata"] == {"figures": 600}
+    assert set(found["contents"]) == {each.contents[0] for each in figures}
+    for each in figures:
+        facts = found["contents"][each.contents[0]]["metadata"]
+        assert facts["name"] == each.name
+        assert facts["parts"] == ["head", "torso"]
+        assert facts["longitude"] == each.placement.lon_deg
+    # Root, file, its root, two levels, the figure: counted from 0.
+    assert found["depth"] <= 6
+
+
+@pytest.mark.slow
+def test_tiles_tools_reads_version_1_0(four: Path, tmp_path: Path, tiles_tools: RunScript) -> None:
+    write_figures([four], tmp_path / "out", version="1.0")
+    found = tiles_tools("tiles_tools_many.mjs", tmp_path / "out" / "tileset.json", "--batch")
+    assert len(found["contents"]) == 6
+    for each in found["contents"].values():
+        assert each["kind"] == "b3dm"
+        assert each["extras"]["parts"] == each["batch"]["name"] == ["torso", "head", "l_upper_leg"]
+        assert each["batch"]["label"] == [1, 2, 9]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", ["1.0", "1.1"])
+def test_py3dtiles_reads_many(four: Path, tmp_path: Path, py3dtiles: Callable[[Path], Any], version: Any) -> None:
+    write_figures([four], tmp_path / "out", version=version)
+    found = py3dtiles(tmp_path / "out" / "tileset.json")
+    assert found["version"] == version
+    assert found["tiles"] == 7
+    assert len(found["contents"]) == 6
+    vertices = sorted(content["vertices"] for content in found["contents"].values())
+    assert vertices == sorted([63, 63, 63] + [len(mesh.vertices) for mesh in asset(ZURICH).lods])
+    for content in found["contents"].values():
+        assert content["kind"] == ("B3dm" if version == "1.0" else "Gltf")
+        assert version == "1.1" or content["batch"]["name"] == ["torso", "head", "l_upper_leg"]

@@ -1,0 +1,30 @@
+"""Models back from their files, whatever client they were written for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exporters.errors import ExportError
+from exporters.profiles import PROFILES, profile_named
+from exporters.write import write
+from fig2mesh.render.model import read_model
+from tests.exporters.analytic import ZURICH, asset
+
+
+@pytest.mark.parametrize("name", [None, "blender", "qgis"])
+def test_labels_of_parts_come_back(tmp_path: Path, name: str | None) -> None:
+    given = asset(ZURICH)
+    write(given, tmp_path / "a.glb", profile=profile_named(name))
+    mesh = read_model(tmp_path / "a.glb")
+    assert np.array_equal(mesh.vertices, given.mesh.vertices)
+    assert mesh.parts is not None
+    assert np.array_equal(mesh.parts, given.mesh.parts)
+
+
+def test_compressed_models_are_refused_by_name(tmp_path: Path) -> None:
+    write(asset(ZURICH), tmp_path / "a.glb", profile=PROFILES["cesiumjs"])
+    with pytest.raises(ExportError, match=r"a\.glb: is compressed \(EXT_meshopt_compression\); give the file written"):
+        read_model(tmp_path / "a.glb")
