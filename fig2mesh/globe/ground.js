@@ -10,7 +10,7 @@ function groundAt(height) {
   });
 }
 
-// Lines round a place, 10 steps to each side, every tenth one stronger and longer. Returns the step in metres.
+// Lines round a place, 10 steps to each side, with longer ones at every tenth. Returns the step in metres.
 function drawGrid(lines, feet, size) {
   const { Cartesian3, Color, Material, Matrix4, Transforms } = Cesium;
   const step = 10 ** Math.round(Math.log10(size / 1.8));
@@ -22,8 +22,8 @@ function drawGrid(lines, feet, size) {
       lines.add({ positions, width, material: Material.fromType('Color', { color: colour }) });
     }
   };
-  for (let i = -10; i <= 10; i++) if (i % 10) add(i * step, 10 * step, 1, Color.BLACK.withAlpha(0.35));
-  for (let i = -10; i <= 10; i++) add(10 * i * step, 100 * step, 1.5, Color.BLACK.withAlpha(0.5));
+  for (let i = -10; i <= 10; i++) if (i % 10) add(i * step, 10 * step, 1, Color.BLACK.withAlpha(0.25));
+  for (let i = -5; i <= 5; i++) add(10 * i * step, 50 * step, 1.5, Color.BLACK.withAlpha(0.4));
   return step;
 }
 
