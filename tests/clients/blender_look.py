@@ -69,7 +69,9 @@ def plain(item: bpy.types.ID) -> dict:
     found = {}
     for key in item.keys():  # noqa: SIM118 - this is no dict
         value = item[key]
-        found[key] = value.to_dict() if hasattr(value, "to_dict") else value.to_list() if hasattr(value, "to_list") else value
+        found[key] = (
+            value.to_dict() if hasattr(value, "to_dict") else value.to_list() if hasattr(value, "to_list") else value
+        )
     return {key: value for key, value in found.items() if isinstance(value, str | int | float | list | dict)}
 
 
