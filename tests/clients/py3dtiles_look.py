@@ -33,7 +33,7 @@ def main() -> None:
             {
                 "geometric_error": tile.geometric_error,
                 "uri": str(tile.content_uri),
-                "vertices": len(x),
+                "triangles": len(x) // 3,
                 "inside": inside,
                 "feet": ecef_from_tile[:3, 3].tolist(),
             }
