@@ -1,0 +1,386 @@
+"""Draws the pictorial map in `maps/lake_zurich/`: land, lakes, rivers, roads, hills, names, and three people on it.
+
+    python examples/draw_map.py [OUT]
+
+writes to OUT, by default back into `maps/lake_zurich/`: map.jpg; map.jgw, the world file that places it (WGS 84
+longitude and latitude, linear in the pixels); figures.csv, one row a figure: its picture, where its feet are on the
+sheet (pixels, as in IMAGE: middles of pixels at +0.5), its height in metres at the sheet's scale, and its box.
+
+Shores, streams and towns are where they are to about 300 m, drawn by hand for this map; nothing is copied from others.
+"""
+
+from __future__ import annotations
+
+import base64
+import csv
+import io
+import json
+import math
+import random
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import resvg_py
+from PIL import Image
+
+HERE = Path(__file__).resolve().parent
+FIGURES, MAPS = HERE / "figures", HERE / "maps"
+WEST, SOUTH, EAST, NORTH = 8.38, 47.16, 8.92, 47.44
+WIDTH, HEIGHT = 2040, 1560
+METRES_PER_DEGREE = (75_600.0, 111_180.0)
+"""East and north, at the middle of the sheet: pixels are square there, 20 m."""
+
+Point = tuple[float, float]
+
+PEOPLE = (("footballer", 8.478, 47.3745), ("market_woman", 8.557, 47.2005), ("farmer", 8.843, 47.2815))
+"""Figure and where its feet are, longitude and latitude."""
+TALL = 310
+"""Pixels from top to sole."""
+
+INK, LAND, WATER, SHORE, ROAD, FOREST, HILL = (
+    "#4a3728", "#f1e5c4", "#a9cfd6", "#3f7482", "#b5533c", "#6f8f5a", "#d9c08c",
+)  # fmt: skip
+
+LAKE = (
+    (8.5445, 47.3665), (8.5365, 47.3580), (8.5335, 47.3430), (8.5460, 47.3220), (8.5570, 47.3080), (8.5690, 47.2950),
+    (8.5840, 47.2760), (8.5990, 47.2615), (8.6220, 47.2530), (8.6430, 47.2500), (8.6500, 47.2410), (8.6740, 47.2310),
+    (8.6900, 47.2190), (8.7060, 47.2090), (8.7300, 47.2050), (8.7570, 47.2060), (8.7790, 47.2040), (8.7960, 47.2100),
+    (8.8080, 47.2180), (8.8180, 47.2130), (8.8300, 47.2010), (8.8530, 47.1950), (8.8800, 47.1960), (8.9300, 47.2040),
+    (8.9300, 47.2230), (8.9000, 47.2210), (8.8650, 47.2230), (8.8350, 47.2230), (8.8190, 47.2250), (8.8130, 47.2370),
+    (8.7850, 47.2370), (8.7540, 47.2350), (8.7230, 47.2390), (8.6920, 47.2530), (8.6750, 47.2620), (8.6420, 47.2690),
+    (8.6140, 47.2880), (8.5930, 47.3030), (8.5800, 47.3180), (8.5720, 47.3370), (8.5560, 47.3500), (8.5490, 47.3630),
+)  # fmt: skip
+GREIFENSEE = (
+    (8.6620, 47.3710), (8.6780, 47.3670), (8.6900, 47.3530), (8.7030, 47.3350), (8.6970, 47.3260), (8.6850, 47.3370),
+    (8.6720, 47.3510), (8.6590, 47.3630),
+)  # fmt: skip
+PFAEFFIKERSEE = ((8.7780, 47.3640), (8.7910, 47.3620), (8.7960, 47.3520), (8.7900, 47.3410), (8.7780, 47.3420), (8.7720, 47.3530))
+ZUGERSEE = ((8.4400, 47.1500), (8.4380, 47.1720), (8.4520, 47.1880), (8.4700, 47.1960), (8.4930, 47.1870), (8.5130, 47.1730), (8.5100, 47.1500))
+RIVERS = {
+    "Limmat": ((8.5440, 47.3660), (8.5405, 47.3770), (8.5200, 47.3920), (8.4850, 47.3985), (8.4400, 47.4040), (8.4000, 47.4090), (8.3700, 47.4210)),
+    "Sihl": (
+        (8.5390, 47.3790), (8.5250, 47.3650), (8.5170, 47.3450), (8.5230, 47.3200), (8.5360, 47.2950), (8.5510, 47.2700),
+        (8.5740, 47.2450), (8.6120, 47.2200), (8.6600, 47.1900), (8.7050, 47.1500),
+    ),
+    "Glatt": ((8.6610, 47.3680), (8.6350, 47.3830), (8.5950, 47.4040), (8.5720, 47.4280), (8.5660, 47.4500)),
+    "Aa": ((8.7790, 47.3420), (8.7600, 47.3330), (8.7300, 47.3420), (8.7000, 47.3370)),
+    "Jona": ((8.8950, 47.3000), (8.8700, 47.2830), (8.8520, 47.2600), (8.8350, 47.2350), (8.8250, 47.2240)),
+}  # fmt: skip
+ROADS = (
+    ((8.3700, 47.4030), (8.4000, 47.4040), (8.4450, 47.3990), (8.4900, 47.3930), (8.5360, 47.3760), (8.5500, 47.3680)),
+    ((8.5500, 47.3680), (8.5620, 47.3520), (8.5790, 47.3370), (8.5870, 47.3190), (8.6000, 47.3050), (8.6220, 47.2900), (8.6470, 47.2740), (8.6800, 47.2680), (8.6970, 47.2580), (8.7250, 47.2450), (8.7550, 47.2410), (8.7850, 47.2430), (8.8150, 47.2420), (8.8200, 47.2290), (8.8350, 47.2270), (8.8700, 47.2280), (8.9300, 47.2290)),
+    ((8.5360, 47.3760), (8.5300, 47.3580), (8.5280, 47.3430), (8.5400, 47.3180), (8.5500, 47.3040), (8.5620, 47.2920), (8.5770, 47.2730), (8.5930, 47.2570), (8.6330, 47.2430), (8.6680, 47.2260), (8.7000, 47.2040), (8.7300, 47.2000), (8.7800, 47.1990), (8.8100, 47.1980), (8.8500, 47.1900), (8.9300, 47.1960)),
+    ((8.7980, 47.2030), (8.8070, 47.2140), (8.8160, 47.2250)),
+    ((8.5500, 47.3720), (8.5900, 47.3850), (8.6200, 47.3980), (8.6600, 47.3850), (8.7000, 47.3630), (8.7250, 47.3500), (8.7600, 47.3280), (8.8000, 47.3240), (8.8150, 47.2950), (8.8200, 47.2600), (8.8180, 47.2420)),
+    ((8.5360, 47.3720), (8.5050, 47.3450), (8.4750, 47.3150), (8.4650, 47.2800), (8.4600, 47.2400), (8.4850, 47.2100), (8.5170, 47.1760), (8.5200, 47.1500)),
+    ((8.5360, 47.3790), (8.5550, 47.4000), (8.5800, 47.4200), (8.6000, 47.4500)),
+    ((8.5620, 47.2920), (8.5480, 47.2700), (8.5450, 47.2400), (8.5250, 47.2000), (8.5180, 47.1760)),
+)  # fmt: skip
+TOWNS = {
+    # name: place, size, where the name goes (pixels), how it is aligned
+    "Zürich": ((8.5440, 47.3745), 4, (30, -26), "start"), "Küsnacht": ((8.5860, 47.3190), 1, (14, -6), "start"),
+    "Meilen": ((8.6460, 47.2730), 1, (12, -10), "start"), "Stäfa": ((8.7250, 47.2440), 1, (8, -14), "start"),
+    "Rapperswil": ((8.8180, 47.2275), 2, (24, -10), "start"), "Wädenswil": ((8.6690, 47.2270), 2, (-8, 30), "middle"),
+    "Horgen": ((8.5930, 47.2580), 1, (-14, 20), "end"), "Thalwil": ((8.5600, 47.2930), 1, (-12, -6), "end"),
+    "Uster": ((8.7210, 47.3500), 2, (22, -4), "start"), "Wetzikon": ((8.7990, 47.3250), 1, (14, 4), "start"),
+    "Dübendorf": ((8.6190, 47.3970), 1, (14, -8), "start"), "Dietikon": ((8.4010, 47.4055), 1, (0, 26), "middle"),
+    "Zug": ((8.5160, 47.1740), 2, (24, 4), "start"), "Lachen": ((8.8530, 47.1910), 1, (0, 26), "middle"),
+    "Pfäffikon": ((8.7830, 47.3675), 1, (0, -14), "middle"), "Adliswil": ((8.5240, 47.3100), 1, (-12, 14), "end"),
+    "Richterswil": ((8.7030, 47.2050), 1, (-6, 26), "middle"), "Affoltern": ((8.4520, 47.2770), 1, (-14, 4), "end"),
+}  # fmt: skip
+HILLS = {
+    # name or "": places and sizes of molehills from back to front, where the name goes
+    "Uetliberg": (((8.4910, 47.3490, 62), (8.4960, 47.3390, 50)), (8.4700, 47.3420)),
+    "Albis": (((8.5030, 47.3240, 56), (8.5080, 47.3100, 60), (8.5130, 47.2960, 58), (8.5190, 47.2800, 62), (8.5280, 47.2650, 54)), (8.4860, 47.2930)),
+    "Pfannenstiel": (((8.6480, 47.3080, 54), (8.6620, 47.3000, 70), (8.6800, 47.2880, 60), (8.7000, 47.2780, 50), (8.7240, 47.2680, 48)), (8.6880, 47.3110)),
+    "Zimmerberg": (((8.6060, 47.2330, 52), (8.6330, 47.2180, 48)), (8.6280, 47.2270)),
+    "Etzel": (((8.7500, 47.1790, 64), (8.7750, 47.1740, 76), (8.8000, 47.1800, 60)), (8.7750, 47.1690)),
+    "Bachtel": (((8.8980, 47.3120, 60), (8.8840, 47.2960, 76)), (8.8900, 47.2905)),
+    "Zürichberg": (((8.5740, 47.3850, 46), (8.5870, 47.3770, 50)), (8.6040, 47.3690)),
+    "": (((8.8600, 47.3950, 54), (8.8900, 47.3850, 62), (8.8700, 47.3680, 58), (8.9000, 47.3560, 60), (8.6800, 47.1700, 50), (8.7000, 47.1640, 46)), (0, 0)),
+}  # fmt: skip
+FORESTS = (
+    (8.432, 47.352, 0.030, 0.014), (8.420, 47.318, 0.026, 0.016), (8.615, 47.345, 0.022, 0.012), (8.745, 47.296, 0.024, 0.010),
+    (8.640, 47.425, 0.030, 0.009), (8.712, 47.388, 0.024, 0.010), (8.426, 47.236, 0.024, 0.018), (8.650, 47.206, 0.016, 0.010),
+    (8.870, 47.256, 0.024, 0.010), (8.720, 47.183, 0.020, 0.009), (8.600, 47.178, 0.024, 0.010), (8.500, 47.232, 0.016, 0.012),
+    (8.835, 47.338, 0.014, 0.012), (8.745, 47.372, 0.014, 0.010), (8.430, 47.425, 0.020, 0.006),
+)  # fmt: skip
+
+
+def pixel(lon: float, lat: float) -> Point:
+    """Where a place is on the sheet, pixels from its upper left corner."""
+    return (lon - WEST) / (EAST - WEST) * WIDTH, (NORTH - lat) / (NORTH - SOUTH) * HEIGHT
+
+
+def place(x: float, y: float) -> Point:
+    """Longitude and latitude of a point of the sheet."""
+    return WEST + x / WIDTH * (EAST - WEST), NORTH - y / HEIGHT * (NORTH - SOUTH)
+
+
+def path(points: Sequence[Point], closed: bool = False) -> str:
+    """A smooth curve through places: Catmull-Rom as Bézier."""
+    at = [pixel(*point) for point in points]
+    around = [at[-1], *at, at[0], at[1]] if closed else [at[0], *at, at[-1]]
+    words = [f"M{at[0][0]:.1f},{at[0][1]:.1f}"]
+    for a, b, c, d in zip(around, around[1:], around[2:], around[3:], strict=False):
+        first = (b[0] + (c[0] - a[0]) / 6, b[1] + (c[1] - a[1]) / 6)
+        second = (c[0] - (d[0] - b[0]) / 6, c[1] - (d[1] - b[1]) / 6)
+        words.append("C" + " ".join(f"{x:.1f},{y:.1f}" for x, y in (first, second, c)))
+    return " ".join(words) + ("Z" if closed else "")
+
+
+def line(d: str, colour: str, width: float, more: str = "") -> str:
+    return f'<path d="{d}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linecap="round" stroke-linejoin="round" {more}/>'
+
+
+def waters() -> Iterable[str]:
+    for name, river in RIVERS.items():
+        width = 9 if name == "Limmat" else 6
+        yield line(path(river), SHORE, width + 2.5)
+        yield line(path(river), WATER, width - 1.5)
+    for number, lake in enumerate((LAKE, GREIFENSEE, PFAEFFIKERSEE, ZUGERSEE)):
+        d, name = path(lake, closed=True), f"water{number}"
+        yield f'<clipPath id="{name}"><path d="{d}"/></clipPath><path d="{d}" fill="{WATER}"/>'
+        # Lines along the shore, fainter towards the middle.
+        for width, opacity in ((52, 0.16), (34, 0.24), (18, 0.34)):
+            band = line(d, "#5f9cab", width, f'opacity="{opacity}"') + line(d, WATER, width - 3)
+            yield f'<g clip-path="url(#{name})">{band}</g>'
+        yield line(d, SHORE, 3.2)
+
+
+def hill(lon: float, lat: float, size: float, draw: random.Random) -> str:
+    """A molehill with its shade to the right."""
+    x, y = pixel(lon, lat)
+    w, h = size, 0.62 * size
+    top = (x - 0.1 * w, y - h)
+    outline = f"M{x - w:.1f},{y:.1f} C{x - 0.7 * w:.1f},{y - 0.2 * h:.1f} {x - 0.45 * w:.1f},{top[1]:.1f} {top[0]:.1f},{top[1]:.1f} C{x + 0.3 * w:.1f},{top[1]:.1f} {x + 0.6 * w:.1f},{y - 0.25 * h:.1f} {x + w:.1f},{y:.1f}"
+    strokes = []
+    for i in range(9):
+        t = i / 8
+        sx, sy = top[0] + t * 0.75 * w, top[1] + (0.08 + 0.72 * t**1.6) * h
+        reach = (0.30 + 0.12 * draw.random()) * h * (1 - 0.5 * t)
+        strokes.append(f"M{sx:.1f},{sy:.1f} q{0.02 * w:.1f},{0.5 * reach:.1f} {-0.05 * w:.1f},{reach:.1f}")
+    return (
+        f'<path d="{outline}Z" fill="{HILL}" opacity="0.85"/><path d="{outline}" fill="none" stroke="{INK}" stroke-width="2.6" stroke-linecap="round"/>'
+        + line(" ".join(strokes), INK, 1.7, 'opacity="0.75"')
+    )  # fmt: skip
+
+
+def tree(x: float, y: float, size: float) -> str:
+    return (
+        f'<path d="M{x:.1f},{y:.1f} v{-0.35 * size:.1f}" stroke="{INK}" stroke-width="2.2"/>'
+        f'<ellipse cx="{x:.1f}" cy="{y - 0.78 * size:.1f}" rx="{0.42 * size:.1f}" ry="{0.52 * size:.1f}" fill="{FOREST}" stroke="{INK}" stroke-width="1.6"/>'
+        f'<path d="M{x + 0.1 * size:.1f},{y - 0.45 * size:.1f} q{0.24 * size:.1f},{-0.15 * size:.1f} {0.18 * size:.1f},{-0.45 * size:.1f}" fill="none" stroke="{INK}" stroke-width="1.3" opacity="0.7"/>'
+    )  # fmt: skip
+
+
+def house(x: float, y: float, size: float) -> str:
+    w, h = size, 0.75 * size
+    return (
+        f'<rect x="{x - w / 2:.1f}" y="{y - h:.1f}" width="{w:.1f}" height="{h:.1f}" fill="#fbf4e2" stroke="{INK}" stroke-width="1.8"/>'
+        f'<path d="M{x - 0.65 * w:.1f},{y - h:.1f} L{x:.1f},{y - h - 0.62 * w:.1f} L{x + 0.65 * w:.1f},{y - h:.1f}Z" fill="#c0563f" stroke="{INK}" stroke-width="1.8" stroke-linejoin="round"/>'
+        f'<rect x="{x - 0.12 * w:.1f}" y="{y - 0.5 * h:.1f}" width="{0.24 * w:.1f}" height="{0.5 * h:.1f}" fill="{INK}"/>'
+    )  # fmt: skip
+
+
+def church(x: float, y: float, size: float) -> str:
+    w = 0.5 * size
+    return (
+        f'<rect x="{x - w / 2:.1f}" y="{y - 1.5 * size:.1f}" width="{w:.1f}" height="{1.5 * size:.1f}" fill="#fbf4e2" stroke="{INK}" stroke-width="1.8"/>'
+        f'<path d="M{x - 0.75 * w:.1f},{y - 1.5 * size:.1f} L{x:.1f},{y - 2.7 * size:.1f} L{x + 0.75 * w:.1f},{y - 1.5 * size:.1f}Z" fill="#4f7d86" stroke="{INK}" stroke-width="1.8" stroke-linejoin="round"/>'
+        f'<path d="M{x:.1f},{y - 2.7 * size:.1f} v{-0.45 * size:.1f} m{-0.15 * size:.1f},{0.15 * size:.1f} h{0.3 * size:.1f}" stroke="{INK}" stroke-width="1.8"/>'
+    )  # fmt: skip
+
+
+def text(x: float, y: float, words: str, size: float, style: str = "", anchor: str = "middle", colour: str = INK, halo: bool = True) -> str:
+    font = f'font-family="STIXGeneral" font-size="{size}" text-anchor="{anchor}" {style}'
+    under = f'<text x="{x:.1f}" y="{y:.1f}" {font} stroke="{LAND}" stroke-width="6" stroke-linejoin="round" fill="{LAND}" opacity="0.85">{words}</text>'
+    return (under if halo else "") + f'<text x="{x:.1f}" y="{y:.1f}" {font} fill="{colour}">{words}</text>'
+
+
+def along(points: Sequence[Point], words: str, size: float, spacing: float, name: str) -> str:
+    return (
+        f'<path id="{name}" d="{path(points)}" fill="none"/><text font-family="STIXGeneral" font-style="italic" font-size="{size}" '
+        f'letter-spacing="{spacing}" fill="#2f6170"><textPath href="#{name}" startOffset="0">{words}</textPath></text>'
+    )  # fmt: skip
+
+
+def frame() -> Iterable[str]:
+    """Neat line, graticule, and degrees along them."""
+    inset = 40
+    yield f'<g opacity="0.28" stroke="{INK}" stroke-width="1.4">'
+    lons, lats = [8.4 + 0.1 * i for i in range(6)], [47.2, 47.25, 47.3, 47.35, 47.4]
+    for lon in lons:
+        x = pixel(lon, NORTH)[0]
+        yield f'<path d="M{x:.1f},{inset} V{HEIGHT - inset}"/>'
+    for lat in lats:
+        y = pixel(WEST, lat)[1]
+        yield f'<path d="M{inset},{y:.1f} H{WIDTH - inset}"/>'
+    yield "</g>"
+    yield f'<path d="M0,0 H{WIDTH} V{HEIGHT} H0Z M{inset},{inset} V{HEIGHT - inset} H{WIDTH - inset} V{inset}Z" fill="#f8f0d8" fill-rule="evenodd"/>'
+    # Minutes, dark and light in turn.
+    step_x, step_y = WIDTH / (EAST - WEST) / 60, HEIGHT / (NORTH - SOUTH) / 60
+    for i in range(int((EAST - WEST) * 60) + 1):
+        x = pixel(math.ceil(WEST * 60) / 60, NORTH)[0] + i * step_x
+        if i % 2 == 0:
+            for y in (inset - 12, HEIGHT - inset):
+                left, right = max(x, inset), min(x + step_x, WIDTH - inset)
+                if right > left:
+                    yield f'<rect x="{left:.1f}" y="{y}" width="{right - left:.1f}" height="12" fill="{INK}"/>'
+    for i in range(int((NORTH - SOUTH) * 60) + 1):
+        y = pixel(WEST, math.floor(NORTH * 60) / 60)[1] + i * step_y
+        if i % 2 == 0:
+            for x in (inset - 12, WIDTH - inset):
+                top, bottom = max(y, inset), min(y + step_y, HEIGHT - inset)
+                if bottom > top:
+                    yield f'<rect x="{x}" y="{top:.1f}" width="12" height="{bottom - top:.1f}" fill="{INK}"/>'
+    for gap, width in ((inset, 2), (inset - 12, 2), (inset - 18, 4)):
+        yield f'<rect x="{gap}" y="{gap}" width="{WIDTH - 2 * gap}" height="{HEIGHT - 2 * gap}" fill="none" stroke="{INK}" stroke-width="{width}"/>'
+    for lon in lons:
+        x = pixel(lon, NORTH)[0]
+        for y in (18, HEIGHT - 6):
+            yield text(x, y, f"{lon:.1f}° E", 17, halo=False)
+    for lat in lats:
+        y = pixel(WEST, lat)[1]
+        for x, turn in ((16, -90), (WIDTH - 16, 90)):
+            yield f'<g transform="rotate({turn} {x} {y:.1f})">{text(x, y + 4, f"{lat:.2f}° N", 17, halo=False)}</g>'
+
+
+def title() -> Iterable[str]:
+    x, y = 1660, 132
+    yield f'<path d="M{x - 300},{y - 66} q300,-26 600,0 l-14,36 14,62 q-300,24 -600,0 l14,-60Z" fill="#f8f0d8" stroke="{INK}" stroke-width="3.5" stroke-linejoin="round"/>'
+    yield text(x, y - 8, "AROUND LAKE ZÜRICH", 46, 'font-weight="bold" letter-spacing="3"', halo=False)
+    yield text(x, y + 27, "its people, its towns and its hills", 25, 'font-style="italic"', halo=False)
+    # A bar of ten kilometres.
+    left, low, km = 84, HEIGHT - 76, 1000 / METRES_PER_DEGREE[0] / (EAST - WEST) * WIDTH
+    for i in range(5):
+        yield f'<rect x="{left + 2 * i * km:.1f}" y="{low}" width="{2 * km:.1f}" height="9" fill="{INK if i % 2 == 0 else "#f8f0d8"}" stroke="{INK}" stroke-width="1.8"/>'
+    for i in (0, 5, 10):
+        yield text(left + i * km, low - 8, f"{i} km" if i == 10 else str(i), 19)
+
+
+def rose() -> Iterable[str]:
+    x, y, r = 1905, 1420, 62
+    yield f'<circle cx="{x}" cy="{y}" r="{0.62 * r}" fill="none" stroke="{INK}" stroke-width="1.8"/>'
+    for turn, reach in ((45, 0.62), (0, 1.0)):
+        for i in range(4):
+            angle = math.radians(turn + 90 * i)
+            tip = (x + reach * r * math.sin(angle), y - reach * r * math.cos(angle))
+            for side, fill in ((-1, INK), (1, "#f8f0d8")):
+                a = angle + side * math.pi / 4
+                foot = (x + 0.18 * r * math.sin(a), y - 0.18 * r * math.cos(a))
+                yield f'<path d="M{x},{y} L{foot[0]:.1f},{foot[1]:.1f} L{tip[0]:.1f},{tip[1]:.1f}Z" fill="{fill}" stroke="{INK}" stroke-width="1.4"/>'
+    yield text(x, y - r - 8, "N", 30, 'font-weight="bold"')
+
+
+def people() -> list[dict[str, str | float]]:
+    """One row a figure: picture, feet on the sheet, height at its scale, box."""
+    rows: list[dict[str, str | float]] = []
+    for name, lon, lat in PEOPLE:
+        with Image.open(FIGURES / name / "mask.png") as mask:
+            left, top, right, bottom = mask.getbbox()
+        scale = TALL / (bottom - top)
+        x, y = (round(v, 1) for v in pixel(lon, lat))
+        feet = feet_of(name, top, bottom)
+        box = [x + (left - feet) * scale, y - TALL, x + (right - feet) * scale, y]
+        metres = TALL * METRES_PER_DEGREE[1] * (NORTH - SOUTH) / HEIGHT
+        rows.append({
+            "name": name.replace("_", " "), "figure": f"../../figures/{name}/image.png", "map": "map.jpg", "x": x, "y": y,
+            "height-m": round(metres, 1), "bbox": " ".join(str(round(v)) for v in box),
+        })  # fmt: skip
+    return rows
+
+
+def feet_of(name: str, top: int, bottom: int) -> float:
+    """The column of the drawing between the feet that stand."""
+    joints = json.loads((FIGURES / name / "keypoints.json").read_text(encoding="utf-8"))["keypoints"]
+    feet = [[(joints[f"{side}_ankle"][i] + joints[f"{side}_foot"][i]) / 2 for i in range(2)] for side in "lr"]
+    lowest = max(y for _, y in feet)
+    standing = [x for x, y in feet if y > lowest - 0.12 * (bottom - top)]
+    return sum(standing) / len(standing)
+
+
+def drawn_person(row: dict[str, str | float]) -> str:
+    folder = (MAPS / "lake_zurich" / str(row["figure"])).resolve().parent
+    image, mask = Image.open(folder / "image.png"), Image.open(folder / "mask.png")
+    cut = image.crop(mask.getbbox())
+    stream = io.BytesIO()
+    cut.save(stream, "PNG")
+    x0, y0, x1, y1 = map(float, str(row["bbox"]).split())
+    data = base64.b64encode(stream.getvalue()).decode()
+    shade = f'<ellipse cx="{row["x"]}" cy="{float(row["y"]) - 4:.1f}" rx="{0.36 * (x1 - x0):.1f}" ry="13" fill="{INK}" opacity="0.3"/>'
+    return shade + f'<image x="{x0}" y="{y0}" width="{x1 - x0}" height="{y1 - y0}" preserveAspectRatio="none" href="data:image/png;base64,{data}"/>'
+
+
+def svg(rows: Sequence[dict[str, str | float]]) -> str:
+    """The sheet; the same one each time."""
+    draw = random.Random(7)
+    boxes = [tuple(map(float, str(row["bbox"]).split())) for row in rows]
+    parts = [f'<rect width="{WIDTH}" height="{HEIGHT}" fill="{LAND}"/>', *waters()]
+    for road in ROADS:
+        parts += [line(path(road), INK, 5.4, 'opacity="0.8"'), line(path(road), ROAD, 3.2)]
+    things: list[tuple[float, str]] = []
+    for hills, _ in HILLS.values():
+        things += [(pixel(lon, lat)[1], hill(lon, lat, size, draw)) for lon, lat, size in hills]
+    for lon, lat, rx, ry in FORESTS:
+        for _ in range(int(26_000 * rx * ry) + 5):
+            angle, reach = draw.uniform(0, 2 * math.pi), math.sqrt(draw.random())
+            x, y = pixel(lon + rx * reach * math.cos(angle), lat + ry * reach * math.sin(angle))
+            if not any(x0 - 14 < x < x1 + 14 and y0 - 6 < y < y1 + 30 for x0, y0, x1, y1 in boxes):
+                things.append((y, tree(x, y, draw.uniform(22, 28))))
+    for (lon, lat), size, _, _ in TOWNS.values():
+        x, y = pixel(lon, lat)
+        count = {1: 3, 2: 5, 4: 13}[size]
+        for i in range(count):
+            dx, dy = (draw.uniform(-1, 1) * 8 * (1 + size), draw.uniform(-0.5, 0.5) * 6 * (1 + size)) if i else (0, 0)
+            things.append((y + dy, church(x, y, 13 + 2 * size) if i == 0 else house(x + dx, y + dy + 2, draw.uniform(12, 16))))
+    parts += [drawing for _, drawing in sorted(things, key=lambda thing: thing[0])]
+    parts.append(along(((8.5560, 47.3405), (8.5640, 47.3180), (8.5820, 47.2960), (8.6100, 47.2730), (8.6450, 47.2590), (8.6900, 47.2390)), "Z Ü R I C H S E E", 40, 13, "lake"))
+    parts.append(along(((8.6690, 47.3630), (8.6820, 47.3480), (8.6980, 47.3300)), "Greifensee", 21, 0.5, "greifensee"))
+    parts.append(along(((8.4490, 47.1750), (8.4750, 47.1760), (8.5100, 47.1680)), "Zugersee", 25, 1, "zugersee"))
+    parts.append(along(((8.8360, 47.2060), (8.8700, 47.2050), (8.9050, 47.2070)), "Obersee", 25, 1, "obersee"))
+    parts.append(along(((8.4120, 47.4110), (8.4400, 47.4075), (8.4850, 47.4020)), "Limmat", 22, 4, "limmat"))
+    for name, ((lon, lat), size, (dx, dy), anchor) in TOWNS.items():
+        x, y = pixel(lon, lat)
+        parts.append(text(x + dx, y + dy, name.upper() if size == 4 else name, {1: 24, 2: 28, 4: 40}[size], 'font-weight="bold"' if size > 1 else "", anchor))
+    for name, (_, (lon, lat)) in HILLS.items():
+        if name:
+            parts.append(text(*pixel(lon, lat), name, 23, 'font-style="italic"'))
+    parts += [drawn_person(row) for row in rows]
+    parts += [*frame(), *title(), *rose()]
+    return f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}">' + "".join(parts) + "</svg>"
+
+
+def run(out_dir: str | Path = MAPS / "lake_zurich") -> list[Path]:
+    """Write map.jpg, map.jgw and figures.csv into `out_dir` and return them."""
+    out_dir = Path(out_dir)
+    out_dir.mkdir(parents=True, exist_ok=True)
+    rows = people()
+    fonts = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
+    files = [str(fonts / f"STIXGeneral{style}.ttf") for style in ("", "Bol", "Italic", "BolIta")]
+    png = resvg_py.svg_to_bytes(svg_string=svg(rows), skip_system_fonts=True, font_files=files)
+    paper = np.asarray(Image.open(io.BytesIO(bytes(png))).convert("RGB")).astype(np.float32)
+    # Grain and a darker rim, as old paper has.
+    noise = np.random.default_rng(3).normal(0, 1, (HEIGHT // 4, WIDTH // 4)).astype(np.float32)
+    grain = np.asarray(Image.fromarray(noise).resize((WIDTH, HEIGHT), Image.Resampling.BICUBIC))
+    y, x = np.mgrid[-1 : 1 : HEIGHT * 1j, -1 : 1 : WIDTH * 1j].astype(np.float32)
+    rim = 1 - 0.10 * np.maximum(abs(x), abs(y)) ** 8
+    picture = np.clip((paper + 2.2 * grain[..., None]) * rim[..., None], 0, 255).astype(np.uint8)
+    sheet, world, table = out_dir / "map.jpg", out_dir / "map.jgw", out_dir / "figures.csv"
+    Image.fromarray(picture).save(sheet, quality=82, optimize=True)
+    dx, dy = (EAST - WEST) / WIDTH, (NORTH - SOUTH) / HEIGHT
+    # Its last two numbers are the middle of the first pixel.
+    world.write_text("".join(f"{value:.12f}\n" for value in (dx, 0, 0, -dy, WEST + dx / 2, NORTH - dy / 2)))
+    with table.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return [sheet, world, table]
+
+
+if __name__ == "__main__":
+    for written in run(*sys.argv[1:2]):
+        print(written)
