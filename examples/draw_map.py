@@ -85,10 +85,10 @@ TOWNS = {
     "Meilen": ((8.6460, 47.2730), 1, (12, -10), "start"), "Stäfa": ((8.7250, 47.2440), 1, (8, -14), "start"),
     "Rapperswil": ((8.8180, 47.2275), 2, (24, -10), "start"), "Wädenswil": ((8.6690, 47.2270), 2, (-8, 30), "middle"),
     "Horgen": ((8.5930, 47.2580), 1, (-14, 20), "end"), "Thalwil": ((8.5600, 47.2930), 1, (-12, -6), "end"),
-    "Uster": ((8.7210, 47.3500), 2, (22, -4), "start"), "Wetzikon": ((8.7990, 47.3250), 1, (14, 4), "start"),
-    "Dübendorf": ((8.6190, 47.3970), 1, (14, -8), "start"), "Dietikon": ((8.4010, 47.4055), 1, (0, 26), "middle"),
+    "Uster": ((8.7210, 47.3500), 2, (22, -4), "start"), "Wetzikon": ((8.7990, 47.3250), 1, (-14, -12), "end"),
+    "Dübendorf": ((8.6190, 47.3970), 1, (14, -8), "start"), "Dietikon": ((8.4010, 47.4055), 1, (-28, 28), "start"),
     "Zug": ((8.5160, 47.1740), 2, (24, 4), "start"), "Lachen": ((8.8530, 47.1910), 1, (0, 26), "middle"),
-    "Pfäffikon": ((8.7830, 47.3675), 1, (0, -14), "middle"), "Adliswil": ((8.5240, 47.3100), 1, (-12, 14), "end"),
+    "Pfäffikon": ((8.7830, 47.3675), 1, (18, -8), "start"), "Adliswil": ((8.5240, 47.3100), 1, (-12, 14), "end"),
     "Richterswil": ((8.7030, 47.2050), 1, (-6, 26), "middle"), "Affoltern": ((8.4520, 47.2770), 1, (-14, 4), "end"),
 }  # fmt: skip
 HILLS = {
@@ -252,14 +252,14 @@ def frame() -> Iterable[str]:
 def title() -> Iterable[str]:
     x, y = 1660, 132
     yield f'<path d="M{x - 300},{y - 66} q300,-26 600,0 l-14,36 14,62 q-300,24 -600,0 l14,-60Z" fill="#f8f0d8" stroke="{INK}" stroke-width="3.5" stroke-linejoin="round"/>'
-    yield text(x, y - 8, "AROUND LAKE ZÜRICH", 46, 'font-weight="bold" letter-spacing="3"', halo=False)
+    yield text(x, y - 8, "AROUND LAKE ZÜRICH", 43, 'font-weight="bold" letter-spacing="2"', halo=False)
     yield text(x, y + 27, "its people, its towns and its hills", 25, 'font-style="italic"', halo=False)
-    # A bar of ten kilometres.
-    left, low, km = 84, HEIGHT - 76, 1000 / METRES_PER_DEGREE[0] / (EAST - WEST) * WIDTH
+    # A bar of five kilometres.
+    left, low, km = 1500, 236, 1000 / METRES_PER_DEGREE[0] / (EAST - WEST) * WIDTH
     for i in range(5):
-        yield f'<rect x="{left + 2 * i * km:.1f}" y="{low}" width="{2 * km:.1f}" height="9" fill="{INK if i % 2 == 0 else "#f8f0d8"}" stroke="{INK}" stroke-width="1.8"/>'
-    for i in (0, 5, 10):
-        yield text(left + i * km, low - 8, f"{i} km" if i == 10 else str(i), 19)
+        yield f'<rect x="{left + i * km:.1f}" y="{low}" width="{km:.1f}" height="9" fill="{INK if i % 2 == 0 else "#f8f0d8"}" stroke="{INK}" stroke-width="1.8"/>'
+    for i in (0, 1, 5):
+        yield text(left + i * km, low - 8, f"{i} km" if i == 5 else str(i), 19)
 
 
 def rose() -> Iterable[str]:
@@ -340,6 +340,7 @@ def svg(rows: Sequence[dict[str, str | float]]) -> str:
     parts += [drawing for _, drawing in sorted(things, key=lambda thing: thing[0])]
     parts.append(along(((8.5560, 47.3405), (8.5640, 47.3180), (8.5820, 47.2960), (8.6100, 47.2730), (8.6450, 47.2590), (8.6900, 47.2390)), "Z Ü R I C H S E E", 40, 13, "lake"))
     parts.append(along(((8.6690, 47.3630), (8.6820, 47.3480), (8.6980, 47.3300)), "Greifensee", 21, 0.5, "greifensee"))
+    parts.append(text(*pixel(8.8000, 47.3480), "Pfäffikersee", 21, 'font-style="italic"', "start", "#2f6170"))
     parts.append(along(((8.4490, 47.1750), (8.4750, 47.1760), (8.5100, 47.1680)), "Zugersee", 25, 1, "zugersee"))
     parts.append(along(((8.8360, 47.2060), (8.8700, 47.2050), (8.9050, 47.2070)), "Obersee", 25, 1, "obersee"))
     parts.append(along(((8.4120, 47.4110), (8.4400, 47.4075), (8.4850, 47.4020)), "Limmat", 22, 4, "limmat"))

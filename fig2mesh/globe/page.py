@@ -72,8 +72,8 @@ def globe_page(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = (
         "title": html.escape(title),
         "policy": html.escape(POLICY),
         "cesium": f"{CESIUM}/",
-        # "</" would end the script element.
-        "facts": json.dumps(facts, ensure_ascii=False, allow_nan=False).replace("</", "<\\/"),
+        # "</" would end the script element, and "<!--" change how its end is looked for.
+        "facts": json.dumps(facts, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
         "offline": asset("offline_viewer.js"),
         "style": asset("page.css", PACKAGE),
         "scripts": "\n".join(asset(name, PACKAGE) for name in SCRIPTS),
