@@ -67,24 +67,24 @@ def stand(figure: dict) -> None:
 
 def light() -> None:
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-    sun.data.energy = 2.4
+    sun.data.energy = 2.0
     sun.data.angle = math.radians(3)
     sun.rotation_euler = Euler((math.radians(38), math.radians(-28), 0))
     bpy.context.scene.collection.objects.link(sun)
     world = bpy.data.worlds.new("sky")
     world.use_nodes = True
     world.node_tree.nodes["Background"].inputs[0].default_value = (0.86, 0.92, 1.0, 1)
-    world.node_tree.nodes["Background"].inputs[1].default_value = 0.55
+    world.node_tree.nodes["Background"].inputs[1].default_value = 0.42
     bpy.context.scene.world = world
 
 
 def look(job: dict) -> None:
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.data.lens = 42
+    camera.data.lens = 41
     camera.data.clip_end = 1000
-    camera.location = (3, -46, 25)
-    towards = Vector((0.3, -1.2, 1.0)) - camera.location
+    camera.location = (0, -48, 27)
+    towards = Vector((0, -0.6, 0.6)) - camera.location
     camera.rotation_euler = towards.to_track_quat("-Z", "Y").to_euler()
     scene.collection.objects.link(camera)
     scene.camera = camera
@@ -92,6 +92,7 @@ def look(job: dict) -> None:
     scene.cycles.device = "CPU"
     scene.cycles.samples = job["samples"]
     scene.cycles.use_denoising = True
+    scene.cycles.max_bounces = 2
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = job["size"]
     scene.render.image_settings.file_format = "PNG"

@@ -34,7 +34,7 @@ VIEW = """(async () => {
   const { viewer: { scene, camera } } = fig2mesh;
   fig2mesh.setGrid(false);
   const middle = Cesium.Cartesian3.fromDegrees(%f, %f, 1800);
-  camera.lookAt(middle, new Cesium.HeadingPitchRange(Cesium.Math.toRadians(4), Cesium.Math.toRadians(-27), 46000));
+  camera.lookAt(middle, new Cesium.HeadingPitchRange(0, Cesium.Math.toRadians(-31), 47000));
   camera.lookAtTransform(Cesium.Matrix4.IDENTITY);
   for (let i = 0; i < 300 && !(i > 20 && scene.globe.tilesLoaded); i++) {
     await new Promise((done) => { scene.requestRender(); requestAnimationFrame(done); });
@@ -47,8 +47,8 @@ def globe(models: list[Path], picture: Path) -> None:
     assets, overlays = find_assets(tuple(models)), (Overlay(MAP / "map.jpg", *EDGES),)
     server = page_server(globe_page(assets, overlays), 0, {"cesium": cesium_js()}, page_files(assets, overlays))
     west, south, east, north = EDGES
-    # In the middle from west to east; a little to the south of it, as nearer things look larger.
-    view = VIEW % ((west + east) / 2, 0.55 * south + 0.45 * north)
+    # West and south of the middle: the panel covers the left, and nearer things look larger.
+    view = VIEW % (0.58 * west + 0.42 * east, 0.55 * south + 0.45 * north)
     with serving(server) as address:
         seen = browser()(address, {"evaluate": view}, {"screenshot": True}, size=SIZE)
     if seen["messages"]:
@@ -57,7 +57,7 @@ def globe(models: list[Path], picture: Path) -> None:
     Image.open(io.BytesIO(png)).convert("RGB").save(picture, quality=82, optimize=True)
 
 
-def map_in_blender(models: list[Path], folder: Path, picture: Path, samples: int = 48) -> None:
+def map_in_blender(models: list[Path], folder: Path, picture: Path, samples: int = 16) -> None:
     """Three USD files and the map in Blender."""
     west, south, east, north = EDGES
     east_km, north_km = (metres / 1000 for metres in draw_map.METRES_PER_DEGREE)
@@ -72,7 +72,7 @@ def map_in_blender(models: list[Path], folder: Path, picture: Path, samples: int
     blender(ROOT / "docs" / "blender_map_scene.py", {
         "map": {"image": str(MAP / "map.jpg"), "size_km": size}, "figures": figures, "picture": str(rendered),
         "size": SIZE, "samples": samples,
-    })  # fmt: skip
+    }, seconds=3600)  # fmt: skip
     Image.open(rendered).convert("RGB").save(picture, quality=82, optimize=True)
 
 

@@ -40,10 +40,10 @@ def blender_python() -> Path:
     return interpreter
 
 
-def blender(script: Path, job: Any) -> str:
-    """What a script prints that runs in Blender with JSON for its stdin."""
+def blender(script: Path, job: Any, seconds: int = 300) -> str:
+    """What a script prints that runs in Blender with JSON for its stdin; `seconds` is how long it may take."""
     command = [str(blender_python()), str(script)]
-    done = subprocess.run(command, input=json.dumps(job), capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, input=json.dumps(job), capture_output=True, text=True, check=False, timeout=seconds)
     if done.returncode:
         # A missing system library is no fault of the files that were to be read.
         if "cannot open shared object file" in done.stderr:

@@ -94,10 +94,9 @@ def _model(path: Path) -> GlobeAsset:
     if record is None:
         raise InputError(path, "has no place on the earth", "write it with --lonlat, or show it as 3D Tiles or CZML")
     place = placement_of_record(record)
-    names = [item["name"] for item in gltf.items("nodes") if "name" in item]
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
     facts = {
-        "name": names[0] if names else path.stem,
+        "name": path.stem,
         "credit": asset.get("copyright", ""),
         "metadata": extras.get("metadata", {}),
         # CesiumJS turns models so that they face east at heading 0.

@@ -1,8 +1,10 @@
 // Colours of parts: as drawn, or by what the drawing showed of them; and which part is looked at.
 'use strict';
 
-const OBSERVED = [0x2b / 255, 0x6c / 255, 0xb0 / 255];
-const INFERRED = [0xe0 / 255, 0x7b / 255, 0x39 / 255];
+// CesiumJS blends linear light: the colours of the legend, as it decodes them.
+const linear = (rgb) => rgb.map((c) => (c / 255) ** 2.2);
+const OBSERVED = linear([0x2b, 0x6c, 0xb0]);
+const INFERRED = linear([0xe0, 0x7b, 0x39]);
 const DIMMED = 0.4; // of the brightness of parts that are not the chosen one
 const STRENGTH = 0.75; // of the observed colours over the drawing's own
 
@@ -11,7 +13,6 @@ const perTexel = (model) => model.sceneGraph.components.structuralMetadata?.prop
 
 const glsl = (rgb) => `vec3(${rgb.map((c) => c.toFixed(4)).join(', ')})`;
 const texelShader = () => new Cesium.CustomShader({
-  // sRGB as the drawing's colours are given; the material's are linear.
   fragmentShaderText: `void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
     vec3 evidence = mix(${glsl(INFERRED)}, ${glsl(OBSERVED)}, step(0.5, float(fsInput.metadata.observed)));
     material.diffuse = mix(material.diffuse, evidence, ${STRENGTH.toFixed(2)});

@@ -131,7 +131,7 @@ def test_overlays_need_a_rectangle(tmp_path: Path, edges: tuple[float, float, fl
 
 
 def test_the_page_closes_no_script_early_and_names_no_server(tmp_path: Path, figure: Path) -> None:
-    mean = tmp_path / "mean.glb"
+    mean = tmp_path / "a < b.glb"
     write_glb(asset(ZURICH, lods=(capsule(6, 2),), copyright="</script><script>alert(1)</script>", name="a < b"), mean)
     page = globe_page(find_assets((mean, figure)))
     assert "<script>alert" not in page

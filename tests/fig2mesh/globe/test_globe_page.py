@@ -100,9 +100,14 @@ def seen(tmp_path_factory: pytest.TempPathFactory, look: Look, cesium: Path) -> 
     return {name: result.get("value", result.get("png")) for name, result in zip(actions, found["results"], strict=True)}
 
 
+def linear(srgb: np.ndarray) -> np.ndarray:
+    """As CesiumJS decodes colours."""
+    return (srgb / 255) ** 2.2
+
+
 @pytest.mark.slow
 def test_all_kinds_are_listed_with_place_and_credit(seen: dict[str, Any]) -> None:
-    assert seen["at first"] == "farmerfarmermarkedpin"
+    assert seen["at first"] == "farmermodelmarkedpin"
     tiles, model, entity, pin = seen["facts"]
     assert [each["kind"] for each in (tiles, model, entity, pin)] == ["tiles", "model", "czml", "geojson"]
     for facts, place in ((tiles, ZURICH), (model, EAST), (entity, NORTH)):
@@ -144,9 +149,10 @@ def test_observed_or_inferred_is_shown_by_parts(seen: dict[str, Any]) -> None:
     drawn, evidence, again = (pixels(seen[name])[..., :3].astype(int) for name in ("model picture", "observed picture", "drawn again"))
     at = np.s_[SIZE // 2 - 3 : SIZE // 2 + 4, SIZE // 2 - 3 : SIZE // 2 + 4]
     assert np.abs(drawn[at] - evidence[at]).max() > 20
-    # Half observed: half-way between blue and orange, a quarter of the drawing's own colour kept.
-    middle = 0.75 * np.array([0x2B + 0xE0, 0x6C + 0x7B, 0xB0 + 0x39]) / 2 + 0.25 * drawn[at]
-    np.testing.assert_allclose(evidence[at], middle, atol=30)
+    # Half observed: half-way between blue and orange, a quarter of the drawing's own colour kept; in linear light.
+    blue, orange, own = (linear(np.array(colour)) for colour in ((0x2B, 0x6C, 0xB0), (0xE0, 0x7B, 0x39), drawn[at]))
+    expected = 255 * (0.75 * (blue + orange) / 2 + 0.25 * own) ** (1 / 2.2)
+    np.testing.assert_allclose(evidence[at], expected, atol=6)
     np.testing.assert_allclose(again[at], drawn[at], atol=2)
 
 
