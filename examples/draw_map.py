@@ -57,8 +57,23 @@ GREIFENSEE = (
     (8.6620, 47.3710), (8.6780, 47.3670), (8.6900, 47.3530), (8.7030, 47.3350), (8.6970, 47.3260), (8.6850, 47.3370),
     (8.6720, 47.3510), (8.6590, 47.3630),
 )  # fmt: skip
-PFAEFFIKERSEE = ((8.7780, 47.3640), (8.7910, 47.3620), (8.7960, 47.3520), (8.7900, 47.3410), (8.7780, 47.3420), (8.7720, 47.3530))
-ZUGERSEE = ((8.4400, 47.1500), (8.4380, 47.1720), (8.4520, 47.1880), (8.4700, 47.1960), (8.4930, 47.1870), (8.5130, 47.1730), (8.5100, 47.1500))
+PFAEFFIKERSEE = (
+    (8.7780, 47.3640),
+    (8.7910, 47.3620),
+    (8.7960, 47.3520),
+    (8.7900, 47.3410),
+    (8.7780, 47.3420),
+    (8.7720, 47.3530),
+)
+ZUGERSEE = (
+    (8.4400, 47.1500),
+    (8.4380, 47.1720),
+    (8.4520, 47.1880),
+    (8.4700, 47.1960),
+    (8.4930, 47.1870),
+    (8.5130, 47.1730),
+    (8.5100, 47.1500),
+)
 RIVERS = {
     "Limmat": ((8.5440, 47.3660), (8.5405, 47.3770), (8.5200, 47.3920), (8.4850, 47.3985), (8.4400, 47.4040), (8.4000, 47.4090), (8.3700, 47.4210)),
     "Sihl": (
@@ -195,7 +210,16 @@ def church(x: float, y: float, size: float) -> str:
     )  # fmt: skip
 
 
-def text(x: float, y: float, words: str, size: float, style: str = "", anchor: str = "middle", colour: str = INK, halo: bool = True) -> str:
+def text(
+    x: float,
+    y: float,
+    words: str,
+    size: float,
+    style: str = "",
+    anchor: str = "middle",
+    colour: str = INK,
+    halo: bool = True,
+) -> str:
     font = f'font-family="STIXGeneral" font-size="{size}" text-anchor="{anchor}" {style}'
     under = f'<text x="{x:.1f}" y="{y:.1f}" {font} stroke="{LAND}" stroke-width="6" stroke-linejoin="round" fill="{LAND}" opacity="0.85">{words}</text>'
     return (under if halo else "") + f'<text x="{x:.1f}" y="{y:.1f}" {font} fill="{colour}">{words}</text>'
@@ -312,7 +336,10 @@ def drawn_person(row: dict[str, str | float]) -> str:
     x0, y0, x1, y1 = map(float, str(row["bbox"]).split())
     data = base64.b64encode(stream.getvalue()).decode()
     shade = f'<ellipse cx="{row["x"]}" cy="{float(row["y"]) - 4:.1f}" rx="{0.36 * (x1 - x0):.1f}" ry="13" fill="{INK}" opacity="0.3"/>'
-    return shade + f'<image x="{x0}" y="{y0}" width="{x1 - x0}" height="{y1 - y0}" preserveAspectRatio="none" href="data:image/png;base64,{data}"/>'
+    return (
+        shade
+        + f'<image x="{x0}" y="{y0}" width="{x1 - x0}" height="{y1 - y0}" preserveAspectRatio="none" href="data:image/png;base64,{data}"/>'
+    )
 
 
 def svg(rows: Sequence[dict[str, str | float]]) -> str:
@@ -336,9 +363,26 @@ def svg(rows: Sequence[dict[str, str | float]]) -> str:
         count = {1: 3, 2: 5, 4: 13}[size]
         for i in range(count):
             dx, dy = (draw.uniform(-1, 1) * 8 * (1 + size), draw.uniform(-0.5, 0.5) * 6 * (1 + size)) if i else (0, 0)
-            things.append((y + dy, church(x, y, 13 + 2 * size) if i == 0 else house(x + dx, y + dy + 2, draw.uniform(12, 16))))
+            things.append(
+                (y + dy, church(x, y, 13 + 2 * size) if i == 0 else house(x + dx, y + dy + 2, draw.uniform(12, 16)))
+            )
     parts += [drawing for _, drawing in sorted(things, key=lambda thing: thing[0])]
-    parts.append(along(((8.5560, 47.3405), (8.5640, 47.3180), (8.5820, 47.2960), (8.6100, 47.2730), (8.6450, 47.2590), (8.6900, 47.2390)), "Z Ü R I C H S E E", 40, 13, "lake"))
+    parts.append(
+        along(
+            (
+                (8.5560, 47.3405),
+                (8.5640, 47.3180),
+                (8.5820, 47.2960),
+                (8.6100, 47.2730),
+                (8.6450, 47.2590),
+                (8.6900, 47.2390),
+            ),
+            "Z Ü R I C H S E E",
+            40,
+            13,
+            "lake",
+        )
+    )
     parts.append(along(((8.6690, 47.3630), (8.6820, 47.3480), (8.6980, 47.3300)), "Greifensee", 21, 0.5, "greifensee"))
     parts.append(text(*pixel(8.8000, 47.3480), "Pfäffikersee", 21, 'font-style="italic"', "start", "#2f6170"))
     parts.append(along(((8.4490, 47.1750), (8.4750, 47.1760), (8.5100, 47.1680)), "Zugersee", 25, 1, "zugersee"))
@@ -346,13 +390,26 @@ def svg(rows: Sequence[dict[str, str | float]]) -> str:
     parts.append(along(((8.4120, 47.4110), (8.4400, 47.4075), (8.4850, 47.4020)), "Limmat", 22, 4, "limmat"))
     for name, ((lon, lat), size, (dx, dy), anchor) in TOWNS.items():
         x, y = pixel(lon, lat)
-        parts.append(text(x + dx, y + dy, name.upper() if size == 4 else name, {1: 24, 2: 28, 4: 40}[size], 'font-weight="bold"' if size > 1 else "", anchor))
+        parts.append(
+            text(
+                x + dx,
+                y + dy,
+                name.upper() if size == 4 else name,
+                {1: 24, 2: 28, 4: 40}[size],
+                'font-weight="bold"' if size > 1 else "",
+                anchor,
+            )
+        )
     for name, (_, (lon, lat)) in HILLS.items():
         if name:
             parts.append(text(*pixel(lon, lat), name, 23, 'font-style="italic"'))
     parts += [drawn_person(row) for row in rows]
     parts += [*frame(), *title(), *rose()]
-    return f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}">' + "".join(parts) + "</svg>"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}">'
+        + "".join(parts)
+        + "</svg>"
+    )
 
 
 def run(out_dir: str | Path = MAPS / "lake_zurich") -> list[Path]:

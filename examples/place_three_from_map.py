@@ -31,7 +31,15 @@ def run(out_dir: Path, quality: str = "standard", suffixes: tuple[str, ...] = ("
             place = [lon + dx * (float(row["x"]) - 0.5), lat + dy * (float(row["y"]) - 0.5)]
             arguments = [str(image), "--keypoints", str(image.with_name("keypoints.json"))]
             arguments += ["--lonlat", *(f"{degrees:.9f}" for degrees in place), "--height-m", row["height-m"]]
-            arguments += ["--facing", "viewer", "--quality", quality, "--credit", "fig2mesh authors, MIT", "--overwrite"]
+            arguments += [
+                "--facing",
+                "viewer",
+                "--quality",
+                quality,
+                "--credit",
+                "fig2mesh authors, MIT",
+                "--overwrite",
+            ]
             made = [out_dir / f"{name}{suffix}" for suffix in suffixes]
             code = main(arguments + [word for path in made for word in ("-o", str(path))])
             if code:

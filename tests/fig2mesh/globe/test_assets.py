@@ -123,7 +123,9 @@ def test_a_model_without_a_place_is_refused(tmp_path: Path) -> None:
         find_assets((tmp_path / "empty",))
 
 
-@pytest.mark.parametrize("edges", [(8, 47, 8, 48), (9, 47, 8, 48), (8, 48, 9, 47), (8, 47, 9, 91), (float("nan"), 47, 9, 48)])
+@pytest.mark.parametrize(
+    "edges", [(8, 47, 8, 48), (9, 47, 8, 48), (8, 48, 9, 47), (8, 47, 9, 91), (float("nan"), 47, 9, 48)]
+)
 def test_overlays_need_a_rectangle(tmp_path: Path, edges: tuple[float, float, float, float]) -> None:
     (tmp_path / "map.png").write_bytes(b"")
     with pytest.raises(InputError, match="--overlay"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,14 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exporters.glb import write_glb
+from exporters.asset import Texture
+from exporters.glb import glb_bytes, write_glb
 from exporters.tiles import write_tileset
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server
 from tests.browser import Look, pixels, serving
 from tests.clients.places import BARE, czml
-from tests.exporters.analytic import HEIGHT, ZURICH, asset
+from tests.exporters.analytic import HEIGHT, ZURICH, asset, half_observed
 
 EAST = replace(ZURICH, lon_deg=ZURICH.lon_deg + 4e-5, heading_deg=30.0)
 NORTH = replace(ZURICH, lat_deg=ZURICH.lat_deg + 4e-5, heading_deg=250.0)
@@ -97,7 +99,9 @@ def seen(tmp_path_factory: pytest.TempPathFactory, look: Look, cesium: Path) -> 
         found = look(address, *actions.values(), size=(SIZE, SIZE))
     assert found["messages"] == []
     assert [request for request in found["requests"] if not request.startswith(address)] == []
-    return {name: result.get("value", result.get("png")) for name, result in zip(actions, found["results"], strict=True)}
+    return {
+        name: result.get("value", result.get("png")) for name, result in zip(actions, found["results"], strict=True)
+    }
 
 
 def linear(srgb: np.ndarray) -> np.ndarray:
@@ -146,7 +150,9 @@ def test_parts_are_picked_named_and_stand_out(seen: dict[str, Any]) -> None:
 @pytest.mark.slow
 def test_observed_or_inferred_is_shown_by_parts(seen: dict[str, Any]) -> None:
     assert seen["grain"] == ["observed", "by the share of each part"]
-    drawn, evidence, again = (pixels(seen[name])[..., :3].astype(int) for name in ("model picture", "observed picture", "drawn again"))
+    drawn, evidence, again = (
+        pixels(seen[name])[..., :3].astype(int) for name in ("model picture", "observed picture", "drawn again")
+    )
     at = np.s_[SIZE // 2 - 3 : SIZE // 2 + 4, SIZE // 2 - 3 : SIZE // 2 + 4]
     assert np.abs(drawn[at] - evidence[at]).max() > 20
     # Half observed: half-way between blue and orange, a quarter of the drawing's own colour kept; in linear light.
@@ -166,3 +172,55 @@ def test_levels_are_forced_and_say_what_they_are(seen: dict[str, Any]) -> None:
         assert text == f"shown: LOD {level}, {error}, {len(meshes[level].faces):,} triangles"
     assert seen["forced"] is None
     assert seen["current"] == 1
+
+
+def with_observed(glb: bytes, mask: Texture) -> bytes:
+    """The file with a property texture of what the drawing showed: 1 where it did, texel for texel of the colours.
+
+    https://github.com/CesiumGS/glTF/tree/3d-tiles-next/extensions/2.0/Vendor/EXT_structural_metadata#property-textures
+    """
+    (length,) = struct.unpack_from("<I", glb, 12)
+    document, binary = json.loads(glb[20 : 20 + length]), glb[28 + length :]
+    binary += bytes(-len(binary) % 8)
+    view = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(mask.png)}
+    document["bufferViews"].append(view)
+    binary += mask.png + bytes(-len(mask.png) % 4)
+    document["buffers"] = [{"byteLength": len(binary)}]
+    document["images"].append({"bufferView": len(document["bufferViews"]) - 1, "mimeType": "image/png"})
+    document["samplers"].append({"magFilter": 9728, "minFilter": 9728})
+    document["textures"].append({"sampler": 1, "source": 1})
+    metadata = document["extensions"]["EXT_structural_metadata"]
+    kind = {"type": "SCALAR", "componentType": "UINT8", "normalized": True, "required": True}
+    metadata["schema"]["classes"]["surface"] = {"properties": {"observed": kind}}
+    texture = {"index": 1, "texCoord": 0, "channels": [0]}
+    metadata["propertyTextures"] = [{"class": "surface", "properties": {"observed": texture}}]
+    primitive = document["meshes"][0]["primitives"][0]
+    primitive["extensions"]["EXT_structural_metadata"] = {"propertyTextures": [0]}
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+@pytest.mark.slow
+def test_observed_or_inferred_is_shown_by_texels_where_a_file_has_them(
+    tmp_path: Path, look: Look, cesium: Path
+) -> None:
+    (tmp_path / "fine.glb").write_bytes(with_observed(glb_bytes(asset(ZURICH)), half_observed()))
+    actions = [
+        {"evaluate": BARE}, {"evaluate": LOOK.format(index=0)}, {"evaluate": "fig2mesh.setMode(true)"}, {"screenshot": True},
+        {"evaluate": "(fig2mesh.viewer.camera.rotateLeft(Math.PI), fig2mesh.viewer.scene.requestRender())"},
+        {"screenshot": True}, {"evaluate": "document.getElementById('grain').textContent"},
+        {"key": "o"}, {"screenshot": True},
+    ]  # fmt: skip
+    assets = find_assets((tmp_path / "fine.glb",))
+    with serving(page_server(globe_page(assets), 0, {"cesium": cesium}, page_files(assets))) as address:
+        found = look(address, *actions, size=(SIZE, SIZE))
+    assert found["messages"] == []
+    assert found["results"][6]["value"] == "for each point of the surface"
+    front, back, drawn = (
+        pixels(found["results"][i]["png"])[SIZE // 2, SIZE // 2, :3].astype(int) for i in (3, 5, 8)
+    )  # fmt: skip
+    assert front[2] > front[0] + 60, "what the drawing showed is blue"
+    assert back[0] > back[2] + 60, "what it did not is orange"
+    assert abs(int(drawn[2]) - 128) < 8, "the drawing's own colour again"
