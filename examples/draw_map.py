@@ -20,6 +20,7 @@ import random
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -28,100 +29,21 @@ from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 FIGURES, MAPS = HERE / "figures", HERE / "maps"
-WEST, SOUTH, EAST, NORTH = 8.38, 47.16, 8.92, 47.44
+SHEET = json.loads((MAPS / "lake_zurich" / "sheet.json").read_text(encoding="utf-8"))
+WEST, SOUTH, EAST, NORTH = SHEET["edges"]
 WIDTH, HEIGHT = 2040, 1560
 METRES_PER_DEGREE = (75_600.0, 111_180.0)
 """East and north, at the middle of the sheet: pixels are square there, 20 m."""
 
 Point = tuple[float, float]
 
-PEOPLE = (("footballer", 8.478, 47.3745), ("market_woman", 8.557, 47.2005), ("farmer", 8.843, 47.2815))
+PEOPLE = tuple(tuple(person) for person in SHEET["people"])
 """Figure and where its feet are, longitude and latitude."""
 TALL = 310
 """Pixels from top to sole."""
 
 INK, LAND, WATER, SHORE, ROAD, FOREST, HILL = (
     "#4a3728", "#f1e5c4", "#a9cfd6", "#3f7482", "#b5533c", "#6f8f5a", "#d9c08c",
-)  # fmt: skip
-
-LAKE = (
-    (8.5445, 47.3665), (8.5365, 47.3580), (8.5335, 47.3430), (8.5460, 47.3220), (8.5570, 47.3080), (8.5690, 47.2950),
-    (8.5840, 47.2760), (8.5990, 47.2615), (8.6220, 47.2530), (8.6430, 47.2500), (8.6500, 47.2410), (8.6740, 47.2310),
-    (8.6900, 47.2190), (8.7060, 47.2090), (8.7300, 47.2050), (8.7570, 47.2060), (8.7790, 47.2040), (8.7960, 47.2100),
-    (8.8080, 47.2180), (8.8180, 47.2130), (8.8300, 47.2010), (8.8530, 47.1950), (8.8800, 47.1960), (8.9300, 47.2040),
-    (8.9300, 47.2230), (8.9000, 47.2210), (8.8650, 47.2230), (8.8350, 47.2230), (8.8190, 47.2250), (8.8130, 47.2370),
-    (8.7850, 47.2370), (8.7540, 47.2350), (8.7230, 47.2390), (8.6920, 47.2530), (8.6750, 47.2620), (8.6420, 47.2690),
-    (8.6140, 47.2880), (8.5930, 47.3030), (8.5800, 47.3180), (8.5720, 47.3370), (8.5560, 47.3500), (8.5490, 47.3630),
-)  # fmt: skip
-GREIFENSEE = (
-    (8.6620, 47.3710), (8.6780, 47.3670), (8.6900, 47.3530), (8.7030, 47.3350), (8.6970, 47.3260), (8.6850, 47.3370),
-    (8.6720, 47.3510), (8.6590, 47.3630),
-)  # fmt: skip
-PFAEFFIKERSEE = (
-    (8.7780, 47.3640),
-    (8.7910, 47.3620),
-    (8.7960, 47.3520),
-    (8.7900, 47.3410),
-    (8.7780, 47.3420),
-    (8.7720, 47.3530),
-)
-ZUGERSEE = (
-    (8.4400, 47.1500),
-    (8.4380, 47.1720),
-    (8.4520, 47.1880),
-    (8.4700, 47.1960),
-    (8.4930, 47.1870),
-    (8.5130, 47.1730),
-    (8.5100, 47.1500),
-)
-RIVERS = {
-    "Limmat": ((8.5440, 47.3660), (8.5405, 47.3770), (8.5200, 47.3920), (8.4850, 47.3985), (8.4400, 47.4040), (8.4000, 47.4090), (8.3700, 47.4210)),
-    "Sihl": (
-        (8.5390, 47.3790), (8.5250, 47.3650), (8.5170, 47.3450), (8.5230, 47.3200), (8.5360, 47.2950), (8.5510, 47.2700),
-        (8.5740, 47.2450), (8.6120, 47.2200), (8.6600, 47.1900), (8.7050, 47.1500),
-    ),
-    "Glatt": ((8.6610, 47.3680), (8.6350, 47.3830), (8.5950, 47.4040), (8.5720, 47.4280), (8.5660, 47.4500)),
-    "Aa": ((8.7790, 47.3420), (8.7600, 47.3330), (8.7300, 47.3420), (8.7000, 47.3370)),
-    "Jona": ((8.8950, 47.3000), (8.8700, 47.2830), (8.8520, 47.2600), (8.8350, 47.2350), (8.8250, 47.2240)),
-}  # fmt: skip
-ROADS = (
-    ((8.3700, 47.4030), (8.4000, 47.4040), (8.4450, 47.3990), (8.4900, 47.3930), (8.5360, 47.3760), (8.5500, 47.3680)),
-    ((8.5500, 47.3680), (8.5620, 47.3520), (8.5790, 47.3370), (8.5870, 47.3190), (8.6000, 47.3050), (8.6220, 47.2900), (8.6470, 47.2740), (8.6800, 47.2680), (8.6970, 47.2580), (8.7250, 47.2450), (8.7550, 47.2410), (8.7850, 47.2430), (8.8150, 47.2420), (8.8200, 47.2290), (8.8350, 47.2270), (8.8700, 47.2280), (8.9300, 47.2290)),
-    ((8.5360, 47.3760), (8.5300, 47.3580), (8.5280, 47.3430), (8.5400, 47.3180), (8.5500, 47.3040), (8.5620, 47.2920), (8.5770, 47.2730), (8.5930, 47.2570), (8.6330, 47.2430), (8.6680, 47.2260), (8.7000, 47.2040), (8.7300, 47.2000), (8.7800, 47.1990), (8.8100, 47.1980), (8.8500, 47.1900), (8.9300, 47.1960)),
-    ((8.7980, 47.2030), (8.8070, 47.2140), (8.8160, 47.2250)),
-    ((8.5500, 47.3720), (8.5900, 47.3850), (8.6200, 47.3980), (8.6600, 47.3850), (8.7000, 47.3630), (8.7250, 47.3500), (8.7600, 47.3280), (8.8000, 47.3240), (8.8150, 47.2950), (8.8200, 47.2600), (8.8180, 47.2420)),
-    ((8.5360, 47.3720), (8.5050, 47.3450), (8.4750, 47.3150), (8.4650, 47.2800), (8.4600, 47.2400), (8.4850, 47.2100), (8.5170, 47.1760), (8.5200, 47.1500)),
-    ((8.5360, 47.3790), (8.5550, 47.4000), (8.5800, 47.4200), (8.6000, 47.4500)),
-    ((8.5620, 47.2920), (8.5480, 47.2700), (8.5450, 47.2400), (8.5250, 47.2000), (8.5180, 47.1760)),
-)  # fmt: skip
-TOWNS = {
-    # name: place, size, where the name goes (pixels), how it is aligned
-    "Zürich": ((8.5440, 47.3745), 4, (30, -26), "start"), "Küsnacht": ((8.5860, 47.3190), 1, (14, -6), "start"),
-    "Meilen": ((8.6460, 47.2730), 1, (12, -10), "start"), "Stäfa": ((8.7250, 47.2440), 1, (8, -14), "start"),
-    "Rapperswil": ((8.8180, 47.2275), 2, (24, -10), "start"), "Wädenswil": ((8.6690, 47.2270), 2, (-8, 30), "middle"),
-    "Horgen": ((8.5930, 47.2580), 1, (-14, 20), "end"), "Thalwil": ((8.5600, 47.2930), 1, (-12, -6), "end"),
-    "Uster": ((8.7210, 47.3500), 2, (22, -4), "start"), "Wetzikon": ((8.7990, 47.3250), 1, (-14, -12), "end"),
-    "Dübendorf": ((8.6190, 47.3970), 1, (14, -8), "start"), "Dietikon": ((8.4010, 47.4055), 1, (-28, 28), "start"),
-    "Zug": ((8.5160, 47.1740), 2, (24, 4), "start"), "Lachen": ((8.8530, 47.1910), 1, (0, 26), "middle"),
-    "Pfäffikon": ((8.7830, 47.3675), 1, (18, -8), "start"), "Adliswil": ((8.5240, 47.3100), 1, (-12, 14), "end"),
-    "Richterswil": ((8.7030, 47.2050), 1, (-6, 26), "middle"), "Affoltern": ((8.4520, 47.2770), 1, (-14, 4), "end"),
-}  # fmt: skip
-HILLS = {
-    # name or "": places and sizes of molehills from back to front, where the name goes
-    "Uetliberg": (((8.4910, 47.3490, 62), (8.4960, 47.3390, 50)), (8.4700, 47.3420)),
-    "Albis": (((8.5030, 47.3240, 56), (8.5080, 47.3100, 60), (8.5130, 47.2960, 58), (8.5190, 47.2800, 62), (8.5280, 47.2650, 54)), (8.4860, 47.2930)),
-    "Pfannenstiel": (((8.6480, 47.3080, 54), (8.6620, 47.3000, 70), (8.6800, 47.2880, 60), (8.7000, 47.2780, 50), (8.7240, 47.2680, 48)), (8.6880, 47.3110)),
-    "Zimmerberg": (((8.6060, 47.2330, 52), (8.6330, 47.2180, 48)), (8.6280, 47.2270)),
-    "Etzel": (((8.7500, 47.1790, 64), (8.7750, 47.1740, 76), (8.8000, 47.1800, 60)), (8.7750, 47.1690)),
-    "Bachtel": (((8.8980, 47.3120, 60), (8.8840, 47.2960, 76)), (8.8900, 47.2905)),
-    "Zürichberg": (((8.5740, 47.3850, 46), (8.5870, 47.3770, 50)), (8.6040, 47.3690)),
-    "": (((8.8600, 47.3950, 54), (8.8900, 47.3850, 62), (8.8700, 47.3680, 58), (8.9000, 47.3560, 60), (8.6800, 47.1700, 50), (8.7000, 47.1640, 46)), (0, 0)),
-}  # fmt: skip
-FORESTS = (
-    (8.432, 47.352, 0.030, 0.014), (8.420, 47.318, 0.026, 0.016), (8.615, 47.345, 0.022, 0.012), (8.745, 47.296, 0.024, 0.010),
-    (8.640, 47.425, 0.030, 0.009), (8.712, 47.388, 0.024, 0.010), (8.426, 47.236, 0.024, 0.018), (8.650, 47.206, 0.016, 0.010),
-    (8.870, 47.256, 0.024, 0.010), (8.720, 47.183, 0.020, 0.009), (8.600, 47.178, 0.024, 0.010), (8.500, 47.232, 0.016, 0.012),
-    (8.835, 47.338, 0.014, 0.012), (8.745, 47.372, 0.014, 0.010), (8.430, 47.425, 0.020, 0.006),
 )  # fmt: skip
 
 
@@ -152,11 +74,11 @@ def line(d: str, colour: str, width: float, more: str = "") -> str:
 
 
 def waters() -> Iterable[str]:
-    for name, river in RIVERS.items():
+    for name, river in SHEET["rivers"].items():
         width = 9 if name == "Limmat" else 6
         yield line(path(river), SHORE, width + 2.5)
         yield line(path(river), WATER, width - 1.5)
-    for number, lake in enumerate((LAKE, GREIFENSEE, PFAEFFIKERSEE, ZUGERSEE)):
+    for number, lake in enumerate(SHEET["lakes"].values()):
         d, name = path(lake, closed=True), f"water{number}"
         yield f'<clipPath id="{name}"><path d="{d}"/></clipPath><path d="{d}" fill="{WATER}"/>'
         # Lines along the shore, fainter towards the middle.
@@ -300,6 +222,28 @@ def rose() -> Iterable[str]:
     yield text(x, y - r - 8, "N", 30, 'font-weight="bold"')
 
 
+def houses(town: dict[str, Any], draw: random.Random) -> Iterable[tuple[float, str]]:
+    """A church and some houses round it, each with how far down it stands."""
+    (x, y), size = pixel(*town["at"]), town["size"]
+    yield y, church(x, y, 13 + 2 * size)
+    for _ in range({1: 2, 2: 4, 4: 12}[size]):
+        dx, dy = draw.uniform(-1, 1) * 8 * (1 + size), draw.uniform(-0.5, 0.5) * 6 * (1 + size)
+        yield y + dy, house(x + dx, y + dy + 2, draw.uniform(12, 16))
+
+
+def names() -> Iterable[str]:
+    """Lettering of waters, towns and hills."""
+    for number, (words, name) in enumerate(SHEET["names_along"].items()):
+        yield along(name["along"], words, name["size"], name["spacing"], f"name{number}")
+    for words, town in SHEET["towns"].items():
+        (x, y), size, (dx, dy) = pixel(*town["at"]), town["size"], town["name_px"]
+        shown, style = (words.upper() if size == 4 else words), 'font-weight="bold"' if size > 1 else ""
+        yield text(x + dx, y + dy, shown, {1: 24, 2: 28, 4: 40}[size], style, town["anchor"])
+    for words, hills in SHEET["hills"].items():
+        if words:
+            yield text(*pixel(*hills["name_at"]), words, 23, 'font-style="italic"')
+
+
 def people() -> list[dict[str, str | float]]:
     """One row a figure: picture, feet on the sheet, height at its scale, box."""
     rows: list[dict[str, str | float]] = []
@@ -347,62 +291,21 @@ def svg(rows: Sequence[dict[str, str | float]]) -> str:
     draw = random.Random(7)
     boxes = [tuple(map(float, str(row["bbox"]).split())) for row in rows]
     parts = [f'<rect width="{WIDTH}" height="{HEIGHT}" fill="{LAND}"/>', *waters()]
-    for road in ROADS:
+    for road in SHEET["roads"]:
         parts += [line(path(road), INK, 5.4, 'opacity="0.8"'), line(path(road), ROAD, 3.2)]
     things: list[tuple[float, str]] = []
-    for hills, _ in HILLS.values():
-        things += [(pixel(lon, lat)[1], hill(lon, lat, size, draw)) for lon, lat, size in hills]
-    for lon, lat, rx, ry in FORESTS:
+    for hills in SHEET["hills"].values():
+        things += [(pixel(lon, lat)[1], hill(lon, lat, size, draw)) for lon, lat, size in hills["at_and_size"]]
+    for lon, lat, rx, ry in SHEET["forests"]:
         for _ in range(int(26_000 * rx * ry) + 5):
             angle, reach = draw.uniform(0, 2 * math.pi), math.sqrt(draw.random())
             x, y = pixel(lon + rx * reach * math.cos(angle), lat + ry * reach * math.sin(angle))
             if not any(x0 - 14 < x < x1 + 14 and y0 - 6 < y < y1 + 30 for x0, y0, x1, y1 in boxes):
                 things.append((y, tree(x, y, draw.uniform(22, 28))))
-    for (lon, lat), size, _, _ in TOWNS.values():
-        x, y = pixel(lon, lat)
-        count = {1: 3, 2: 5, 4: 13}[size]
-        for i in range(count):
-            dx, dy = (draw.uniform(-1, 1) * 8 * (1 + size), draw.uniform(-0.5, 0.5) * 6 * (1 + size)) if i else (0, 0)
-            things.append(
-                (y + dy, church(x, y, 13 + 2 * size) if i == 0 else house(x + dx, y + dy + 2, draw.uniform(12, 16)))
-            )
+    for town in SHEET["towns"].values():
+        things += list(houses(town, draw))
     parts += [drawing for _, drawing in sorted(things, key=lambda thing: thing[0])]
-    parts.append(
-        along(
-            (
-                (8.5560, 47.3405),
-                (8.5640, 47.3180),
-                (8.5820, 47.2960),
-                (8.6100, 47.2730),
-                (8.6450, 47.2590),
-                (8.6900, 47.2390),
-            ),
-            "Z Ü R I C H S E E",
-            40,
-            13,
-            "lake",
-        )
-    )
-    parts.append(along(((8.6690, 47.3630), (8.6820, 47.3480), (8.6980, 47.3300)), "Greifensee", 21, 0.5, "greifensee"))
-    parts.append(text(*pixel(8.8000, 47.3480), "Pfäffikersee", 21, 'font-style="italic"', "start", "#2f6170"))
-    parts.append(along(((8.4490, 47.1750), (8.4750, 47.1760), (8.5100, 47.1680)), "Zugersee", 25, 1, "zugersee"))
-    parts.append(along(((8.8360, 47.2060), (8.8700, 47.2050), (8.9050, 47.2070)), "Obersee", 25, 1, "obersee"))
-    parts.append(along(((8.4120, 47.4110), (8.4400, 47.4075), (8.4850, 47.4020)), "Limmat", 22, 4, "limmat"))
-    for name, ((lon, lat), size, (dx, dy), anchor) in TOWNS.items():
-        x, y = pixel(lon, lat)
-        parts.append(
-            text(
-                x + dx,
-                y + dy,
-                name.upper() if size == 4 else name,
-                {1: 24, 2: 28, 4: 40}[size],
-                'font-weight="bold"' if size > 1 else "",
-                anchor,
-            )
-        )
-    for name, (_, (lon, lat)) in HILLS.items():
-        if name:
-            parts.append(text(*pixel(lon, lat), name, 23, 'font-style="italic"'))
+    parts += names()
     parts += [drawn_person(row) for row in rows]
     parts += [*frame(), *title(), *rose()]
     return (

@@ -8,7 +8,13 @@ import pytest
 
 from tests.browser import Look
 from tests.clients.places import (
-    BEARING_TOLERANCE_DEG, FEET_TOLERANCE_M, FORMATS, PICK_TOLERANCE_PX, PLACES, measure, table,
+    BEARING_TOLERANCE_DEG,
+    FEET_TOLERANCE_M,
+    FORMATS,
+    PICK_TOLERANCE_PX,
+    PLACES,
+    measure,
+    table,
 )  # fmt: skip
 
 

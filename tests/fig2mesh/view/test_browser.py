@@ -11,8 +11,8 @@ from skimage.metrics import structural_similarity
 
 from fig2mesh.cli import main
 from fig2mesh.view.page import EFFECTS
-from tests.drawn import write_figure
 from tests.browser import Look, pixels
+from tests.drawn import write_figure
 from tests.fig2mesh.view.conftest import Painted
 from tests.fig2mesh.view.reference import picture
 
