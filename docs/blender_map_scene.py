@@ -67,7 +67,7 @@ def stand(figure: dict) -> None:
 
 def light() -> None:
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-    sun.data.energy = 2.0
+    sun.data.energy = 2.3
     sun.data.angle = math.radians(3)
     sun.rotation_euler = Euler((math.radians(38), math.radians(-28), 0))
     bpy.context.scene.collection.objects.link(sun)
@@ -81,10 +81,10 @@ def light() -> None:
 def look(job: dict) -> None:
     scene = bpy.context.scene
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    camera.data.lens = 41
+    camera.data.lens = 38
     camera.data.clip_end = 1000
     camera.location = (0, -48, 27)
-    towards = Vector((0, -0.6, 0.6)) - camera.location
+    towards = Vector((0, -0.9, 0.9)) - camera.location
     camera.rotation_euler = towards.to_track_quat("-Z", "Y").to_euler()
     scene.collection.objects.link(camera)
     scene.camera = camera

@@ -27,7 +27,7 @@ from fig2mesh.view.server import page_server  # noqa: E402
 from tests.blender import blender  # noqa: E402
 from tests.browser import browser, cesium_js, serving  # noqa: E402
 
-SIZE = (1280, 800)
+SIZE = (1280, 720)
 EDGES = (draw_map.WEST, draw_map.SOUTH, draw_map.EAST, draw_map.NORTH)
 
 VIEW = """(async () => {

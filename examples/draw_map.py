@@ -1,6 +1,6 @@
 """Draws the pictorial map in `maps/lake_zurich/`: land, lakes, rivers, roads, hills, names, and three people on it.
 
-    python examples/draw_map.py [OUT]
+    python -m examples.draw_map [OUT]
 
 writes to OUT, by default back into `maps/lake_zurich/`: map.jpg; map.jgw, the world file that places it (WGS 84
 longitude and latitude, linear in the pixels); figures.csv, one row a figure: its picture, where its feet are on the
@@ -27,6 +27,26 @@ import numpy as np
 import resvg_py
 from PIL import Image
 
+from examples.map_symbols import (
+    INK,
+    LAND,
+    PALE,
+    ROAD,
+    SHORE,
+    WATER,
+    along,
+    box,
+    church,
+    curve,
+    ellipse,
+    hill,
+    house,
+    line,
+    shape,
+    text,
+    tree,
+)  # fmt: skip
+
 HERE = Path(__file__).resolve().parent
 FIGURES, MAPS = HERE / "figures", HERE / "maps"
 SHEET = json.loads((MAPS / "lake_zurich" / "sheet.json").read_text(encoding="utf-8"))
@@ -41,10 +61,6 @@ PEOPLE = tuple(tuple(person) for person in SHEET["people"])
 """Figure and where its feet are, longitude and latitude."""
 TALL = 310
 """Pixels from top to sole."""
-
-INK, LAND, WATER, SHORE, ROAD, FOREST, HILL = (
-    "#4a3728", "#f1e5c4", "#a9cfd6", "#3f7482", "#b5533c", "#6f8f5a", "#d9c08c",
-)  # fmt: skip
 
 
 def pixel(lon: float, lat: float) -> Point:
@@ -69,10 +85,6 @@ def path(points: Sequence[Point], closed: bool = False) -> str:
     return " ".join(words) + ("Z" if closed else "")
 
 
-def line(d: str, colour: str, width: float, more: str = "") -> str:
-    return f'<path d="{d}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linecap="round" stroke-linejoin="round" {more}/>'
-
-
 def waters() -> Iterable[str]:
     for name, river in SHEET["rivers"].items():
         width = 9 if name == "Limmat" else 6
@@ -88,72 +100,6 @@ def waters() -> Iterable[str]:
         yield line(d, SHORE, 3.2)
 
 
-def hill(lon: float, lat: float, size: float, draw: random.Random) -> str:
-    """A molehill with its shade to the right."""
-    x, y = pixel(lon, lat)
-    w, h = size, 0.62 * size
-    top = (x - 0.1 * w, y - h)
-    outline = f"M{x - w:.1f},{y:.1f} C{x - 0.7 * w:.1f},{y - 0.2 * h:.1f} {x - 0.45 * w:.1f},{top[1]:.1f} {top[0]:.1f},{top[1]:.1f} C{x + 0.3 * w:.1f},{top[1]:.1f} {x + 0.6 * w:.1f},{y - 0.25 * h:.1f} {x + w:.1f},{y:.1f}"
-    strokes = []
-    for i in range(9):
-        t = i / 8
-        sx, sy = top[0] + t * 0.75 * w, top[1] + (0.08 + 0.72 * t**1.6) * h
-        reach = (0.30 + 0.12 * draw.random()) * h * (1 - 0.5 * t)
-        strokes.append(f"M{sx:.1f},{sy:.1f} q{0.02 * w:.1f},{0.5 * reach:.1f} {-0.05 * w:.1f},{reach:.1f}")
-    return (
-        f'<path d="{outline}Z" fill="{HILL}" opacity="0.85"/><path d="{outline}" fill="none" stroke="{INK}" stroke-width="2.6" stroke-linecap="round"/>'
-        + line(" ".join(strokes), INK, 1.7, 'opacity="0.75"')
-    )  # fmt: skip
-
-
-def tree(x: float, y: float, size: float) -> str:
-    return (
-        f'<path d="M{x:.1f},{y:.1f} v{-0.35 * size:.1f}" stroke="{INK}" stroke-width="2.2"/>'
-        f'<ellipse cx="{x:.1f}" cy="{y - 0.78 * size:.1f}" rx="{0.42 * size:.1f}" ry="{0.52 * size:.1f}" fill="{FOREST}" stroke="{INK}" stroke-width="1.6"/>'
-        f'<path d="M{x + 0.1 * size:.1f},{y - 0.45 * size:.1f} q{0.24 * size:.1f},{-0.15 * size:.1f} {0.18 * size:.1f},{-0.45 * size:.1f}" fill="none" stroke="{INK}" stroke-width="1.3" opacity="0.7"/>'
-    )  # fmt: skip
-
-
-def house(x: float, y: float, size: float) -> str:
-    w, h = size, 0.75 * size
-    return (
-        f'<rect x="{x - w / 2:.1f}" y="{y - h:.1f}" width="{w:.1f}" height="{h:.1f}" fill="#fbf4e2" stroke="{INK}" stroke-width="1.8"/>'
-        f'<path d="M{x - 0.65 * w:.1f},{y - h:.1f} L{x:.1f},{y - h - 0.62 * w:.1f} L{x + 0.65 * w:.1f},{y - h:.1f}Z" fill="#c0563f" stroke="{INK}" stroke-width="1.8" stroke-linejoin="round"/>'
-        f'<rect x="{x - 0.12 * w:.1f}" y="{y - 0.5 * h:.1f}" width="{0.24 * w:.1f}" height="{0.5 * h:.1f}" fill="{INK}"/>'
-    )  # fmt: skip
-
-
-def church(x: float, y: float, size: float) -> str:
-    w = 0.5 * size
-    return (
-        f'<rect x="{x - w / 2:.1f}" y="{y - 1.5 * size:.1f}" width="{w:.1f}" height="{1.5 * size:.1f}" fill="#fbf4e2" stroke="{INK}" stroke-width="1.8"/>'
-        f'<path d="M{x - 0.75 * w:.1f},{y - 1.5 * size:.1f} L{x:.1f},{y - 2.7 * size:.1f} L{x + 0.75 * w:.1f},{y - 1.5 * size:.1f}Z" fill="#4f7d86" stroke="{INK}" stroke-width="1.8" stroke-linejoin="round"/>'
-        f'<path d="M{x:.1f},{y - 2.7 * size:.1f} v{-0.45 * size:.1f} m{-0.15 * size:.1f},{0.15 * size:.1f} h{0.3 * size:.1f}" stroke="{INK}" stroke-width="1.8"/>'
-    )  # fmt: skip
-
-
-def text(
-    x: float,
-    y: float,
-    words: str,
-    size: float,
-    style: str = "",
-    anchor: str = "middle",
-    colour: str = INK,
-    halo: bool = True,
-) -> str:
-    font = f'font-family="STIXGeneral" font-size="{size}" text-anchor="{anchor}" {style}'
-    under = f'<text x="{x:.1f}" y="{y:.1f}" {font} stroke="{LAND}" stroke-width="6" stroke-linejoin="round" fill="{LAND}" opacity="0.85">{words}</text>'
-    return (under if halo else "") + f'<text x="{x:.1f}" y="{y:.1f}" {font} fill="{colour}">{words}</text>'
-
-
-def along(points: Sequence[Point], words: str, size: float, spacing: float, name: str) -> str:
-    return (
-        f'<path id="{name}" d="{path(points)}" fill="none"/><text font-family="STIXGeneral" font-style="italic" font-size="{size}" '
-        f'letter-spacing="{spacing}" fill="#2f6170"><textPath href="#{name}" startOffset="0">{words}</textPath></text>'
-    )  # fmt: skip
-
-
 def frame() -> Iterable[str]:
     """Neat line, graticule, and degrees along them."""
     inset = 40
@@ -166,7 +112,8 @@ def frame() -> Iterable[str]:
         y = pixel(WEST, lat)[1]
         yield f'<path d="M{inset},{y:.1f} H{WIDTH - inset}"/>'
     yield "</g>"
-    yield f'<path d="M0,0 H{WIDTH} V{HEIGHT} H0Z M{inset},{inset} V{HEIGHT - inset} H{WIDTH - inset} V{inset}Z" fill="#f8f0d8" fill-rule="evenodd"/>'
+    rim = f"M0,0 H{WIDTH} V{HEIGHT} H0Z M{inset},{inset} V{HEIGHT - inset} H{WIDTH - inset} V{inset}Z"
+    yield f'<path d="{rim}" fill="{PALE}" fill-rule="evenodd"/>'
     # Minutes, dark and light in turn.
     step_x, step_y = WIDTH / (EAST - WEST) / 60, HEIGHT / (NORTH - SOUTH) / 60
     for i in range(int((EAST - WEST) * 60) + 1):
@@ -175,16 +122,16 @@ def frame() -> Iterable[str]:
             for y in (inset - 12, HEIGHT - inset):
                 left, right = max(x, inset), min(x + step_x, WIDTH - inset)
                 if right > left:
-                    yield f'<rect x="{left:.1f}" y="{y}" width="{right - left:.1f}" height="12" fill="{INK}"/>'
+                    yield box(left, y, right - left, 12, INK, 0)
     for i in range(int((NORTH - SOUTH) * 60) + 1):
         y = pixel(WEST, math.floor(NORTH * 60) / 60)[1] + i * step_y
         if i % 2 == 0:
             for x in (inset - 12, WIDTH - inset):
                 top, bottom = max(y, inset), min(y + step_y, HEIGHT - inset)
                 if bottom > top:
-                    yield f'<rect x="{x}" y="{top:.1f}" width="12" height="{bottom - top:.1f}" fill="{INK}"/>'
+                    yield box(x, top, 12, bottom - top, INK, 0)
     for gap, width in ((inset, 2), (inset - 12, 2), (inset - 18, 4)):
-        yield f'<rect x="{gap}" y="{gap}" width="{WIDTH - 2 * gap}" height="{HEIGHT - 2 * gap}" fill="none" stroke="{INK}" stroke-width="{width}"/>'
+        yield box(gap, gap, WIDTH - 2 * gap, HEIGHT - 2 * gap, "none", width)
     for lon in lons:
         x = pixel(lon, NORTH)[0]
         for y in (18, HEIGHT - 6):
@@ -197,13 +144,13 @@ def frame() -> Iterable[str]:
 
 def title() -> Iterable[str]:
     x, y = 1660, 132
-    yield f'<path d="M{x - 300},{y - 66} q300,-26 600,0 l-14,36 14,62 q-300,24 -600,0 l14,-60Z" fill="#f8f0d8" stroke="{INK}" stroke-width="3.5" stroke-linejoin="round"/>'
+    yield shape(f"M{x - 300},{y - 66} q300,-26 600,0 l-14,36 14,62 q-300,24 -600,0 l14,-60Z", PALE, 3.5)
     yield text(x, y - 8, "AROUND LAKE ZÜRICH", 43, 'font-weight="bold" letter-spacing="2"', halo=False)
     yield text(x, y + 27, "its people, its towns and its hills", 25, 'font-style="italic"', halo=False)
     # A bar of five kilometres.
     left, low, km = 1500, 236, 1000 / METRES_PER_DEGREE[0] / (EAST - WEST) * WIDTH
     for i in range(5):
-        yield f'<rect x="{left + i * km:.1f}" y="{low}" width="{km:.1f}" height="9" fill="{INK if i % 2 == 0 else "#f8f0d8"}" stroke="{INK}" stroke-width="1.8"/>'
+        yield box(left + i * km, low, km, 9, PALE if i % 2 else INK)
     for i in (0, 1, 5):
         yield text(left + i * km, low - 8, f"{i} km" if i == 5 else str(i), 19)
 
@@ -215,10 +162,10 @@ def rose() -> Iterable[str]:
         for i in range(4):
             angle = math.radians(turn + 90 * i)
             tip = (x + reach * r * math.sin(angle), y - reach * r * math.cos(angle))
-            for side, fill in ((-1, INK), (1, "#f8f0d8")):
+            for side, fill in ((-1, INK), (1, PALE)):
                 a = angle + side * math.pi / 4
                 foot = (x + 0.18 * r * math.sin(a), y - 0.18 * r * math.cos(a))
-                yield f'<path d="M{x},{y} L{foot[0]:.1f},{foot[1]:.1f} L{tip[0]:.1f},{tip[1]:.1f}Z" fill="{fill}" stroke="{INK}" stroke-width="1.4"/>'
+                yield shape(curve("M", x, y, "L", *foot, "L", *tip, "Z"), fill, 1.4)
     yield text(x, y - r - 8, "N", 30, 'font-weight="bold"')
 
 
@@ -234,7 +181,7 @@ def houses(town: dict[str, Any], draw: random.Random) -> Iterable[tuple[float, s
 def names() -> Iterable[str]:
     """Lettering of waters, towns and hills."""
     for number, (words, name) in enumerate(SHEET["names_along"].items()):
-        yield along(name["along"], words, name["size"], name["spacing"], f"name{number}")
+        yield along(path(name["along"]), words, name["size"], name["spacing"], f"name{number}")
     for words, town in SHEET["towns"].items():
         (x, y), size, (dx, dy) = pixel(*town["at"]), town["size"], town["name_px"]
         shown, style = (words.upper() if size == 4 else words), 'font-weight="bold"' if size > 1 else ""
@@ -256,8 +203,8 @@ def people() -> list[dict[str, str | float]]:
         box = [x + (left - feet) * scale, y - TALL, x + (right - feet) * scale, y]
         metres = TALL * METRES_PER_DEGREE[1] * (NORTH - SOUTH) / HEIGHT
         rows.append({
-            "name": name.replace("_", " "), "figure": f"../../figures/{name}/image.png", "map": "map.jpg", "x": x, "y": y,
-            "height-m": round(metres, 1), "bbox": " ".join(str(round(v)) for v in box),
+            "name": name.replace("_", " "), "figure": f"../../figures/{name}/image.png", "map": "map.jpg",
+            "x": x, "y": y, "height-m": round(metres, 1), "bbox": " ".join(str(round(v)) for v in box),
         })  # fmt: skip
     return rows
 
@@ -279,11 +226,9 @@ def drawn_person(row: dict[str, str | float]) -> str:
     cut.save(stream, "PNG")
     x0, y0, x1, y1 = map(float, str(row["bbox"]).split())
     data = base64.b64encode(stream.getvalue()).decode()
-    shade = f'<ellipse cx="{row["x"]}" cy="{float(row["y"]) - 4:.1f}" rx="{0.36 * (x1 - x0):.1f}" ry="13" fill="{INK}" opacity="0.3"/>'
-    return (
-        shade
-        + f'<image x="{x0}" y="{y0}" width="{x1 - x0}" height="{y1 - y0}" preserveAspectRatio="none" href="data:image/png;base64,{data}"/>'
-    )
+    shade = ellipse(float(row["x"]), float(row["y"]) - 4, 0.36 * (x1 - x0), 13, INK, 'opacity="0.3"')
+    place = f'x="{x0}" y="{y0}" width="{x1 - x0}" height="{y1 - y0}" preserveAspectRatio="none"'
+    return shade + f'<image {place} href="data:image/png;base64,{data}"/>'
 
 
 def svg(rows: Sequence[dict[str, str | float]]) -> str:
@@ -295,7 +240,7 @@ def svg(rows: Sequence[dict[str, str | float]]) -> str:
         parts += [line(path(road), INK, 5.4, 'opacity="0.8"'), line(path(road), ROAD, 3.2)]
     things: list[tuple[float, str]] = []
     for hills in SHEET["hills"].values():
-        things += [(pixel(lon, lat)[1], hill(lon, lat, size, draw)) for lon, lat, size in hills["at_and_size"]]
+        things += [(pixel(lon, lat)[1], hill(*pixel(lon, lat), size, draw)) for lon, lat, size in hills["at_and_size"]]
     for lon, lat, rx, ry in SHEET["forests"]:
         for _ in range(int(26_000 * rx * ry) + 5):
             angle, reach = draw.uniform(0, 2 * math.pi), math.sqrt(draw.random())

@@ -169,7 +169,7 @@ def _czml(path: Path) -> GlobeAsset:
         address = model.get("uri") if isinstance(model, dict) else model
         if isinstance(address, str):
             uris.append(address)
-    facts = {"name": packets[0].get("name") or path.stem, "credit": "", "metadata": {}}
+    facts: dict[str, Any] = {"name": packets[0].get("name") or path.stem, "credit": "", "metadata": {}}
     return GlobeAsset("czml", path.name, path.parent, tuple(dict.fromkeys(_needed(path, uris))), facts)
 
 

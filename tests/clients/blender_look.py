@@ -4,7 +4,7 @@ stdin:  {"file": path, "picture": path of a PNG or null, "size": [width, height]
 stdout: after whatever Blender says, one line of JSON: the imported meshes, their materials, parts and properties
 
 The picture is what a camera sees that stands in front of the figure, where Blender has its front view: at -y, looking
-along +y, z up; without perspective, the box of the meshes filling the height; by Cycles on the CPU, in even white light.
+along +y, z up; without perspective, the box of the meshes filling the height; by Cycles on the CPU, in even light.
 https://docs.blender.org/manual/en/4.2/addons/import_export/scene_gltf2.html
 https://docs.blender.org/manual/en/4.2/files/import_export/usd.html
 """

@@ -75,7 +75,7 @@ BARE = """(() => {
   for (const name of ['globe', 'skyBox', 'skyAtmosphere', 'sun', 'moon']) scene[name].show = false;
   scene.backgroundColor = Cesium.Color.WHITE;
   setGrid(false);
-  for (const each of ['panel', '.cesium-viewer-bottom']) (document.getElementById(each) ?? document.querySelector(each)).style.display = 'none';
+  for (const each of ['#panel', '.cesium-viewer-bottom']) document.querySelector(each).style.display = 'none';
   for (const figure of fig2mesh.figures) figure.show(false);
 })()"""
 
@@ -91,13 +91,16 @@ STAND = """(async () => {{
   const found = (point) => Matrix4.multiplyByPoint(matrix, Cartesian3.fromArray(point), new Cartesian3());
   const feet = found([0, 0, 0]);
   const nose = found({nose});
-  const ahead = Matrix4.multiplyByPointAsVector(enuFromEcef, Cartesian3.subtract(nose, feet, new Cartesian3()), new Cartesian3());
+  const direction = Cartesian3.subtract(nose, feet, new Cartesian3());
+  const ahead = Matrix4.multiplyByPointAsVector(enuFromEcef, direction, new Cartesian3());
   // The camera stands where the place asked for says, not where the figure is.
   const bearing = Angle.toRadians({heading});
   const [, up, out] = {nose};
-  const noseAsked = Matrix4.multiplyByPoint(ecefFromEnu, new Cartesian3(out * Math.sin(bearing), out * Math.cos(bearing), up), new Cartesian3());
+  const noseInEnu = new Cartesian3(out * Math.sin(bearing), out * Math.cos(bearing), up);
+  const noseAsked = Matrix4.multiplyByPoint(ecefFromEnu, noseInEnu, new Cartesian3());
   const middle = Cartesian3.midpoint(asked, noseAsked, new Cartesian3());
-  camera.lookAtTransform(Transforms.eastNorthUpToFixedFrame(middle), new HeadingPitchRange(bearing + Angle.toRadians(130), Angle.toRadians(-30), 2.2));
+  const from = new HeadingPitchRange(bearing + Angle.toRadians(130), Angle.toRadians(-30), 2.2);
+  camera.lookAtTransform(Transforms.eastNorthUpToFixedFrame(middle), from);
   for (let i = 0; i < 3; i++) await new Promise((done) => {{ scene.requestRender(); requestAnimationFrame(done); }});
   const [feetAt, noseAt] = [asked, noseAsked].map((point) => SceneTransforms.worldToWindowCoordinates(scene, point));
   return {{
@@ -114,7 +117,8 @@ STAGE = """(() => {{
   const enuFromEcef = Matrix4.inverseTransformation(Transforms.eastNorthUpToFixedFrame(asked), new Matrix4());
   const place = ([x, y, z]) => Matrix4.multiplyByPoint(ecefFromEnu, new Cartesian3(x, -z, y), new Cartesian3());
   const [feet, nose] = [{feet}, {nose}].map(place);
-  const ahead = Matrix4.multiplyByPointAsVector(enuFromEcef, Cartesian3.subtract(nose, feet, new Cartesian3()), new Cartesian3());
+  const direction = Cartesian3.subtract(nose, feet, new Cartesian3());
+  const ahead = Matrix4.multiplyByPointAsVector(enuFromEcef, direction, new Cartesian3());
   return {{ feet_m: Cartesian3.distance(feet, asked), bearing: Cesium.Math.toDegrees(Math.atan2(ahead.x, ahead.y)) }};
 }})()"""
 
@@ -243,7 +247,7 @@ def table(found: list[Found]) -> str:
     lines = [
         "# Feet and bearing in clients",
         "",
-        "Written by `python -m tests.clients.places docs/places.md`; that module says how. The tolerances that tests hold: "
+        "Written by `python -m tests.clients.places docs/places.md`; it says how. Tests hold these tolerances: "
         f"feet {1000 * FEET_TOLERANCE_M:g} mm, bearing {BEARING_TOLERANCE_DEG:g}°, picture {PICK_TOLERANCE_PX:g} px.",
         "",
         "| place | lon, lat, height | bearing | format | feet off, mm | bearing off, ° | picture off, px |",
@@ -257,7 +261,7 @@ def table(found: list[Found]) -> str:
         lines.append(f"| {each.place} | {where} | {place.heading_deg:g}° | {each.format} | {numbers} |")
     lines += [
         "",
-        "GLB is loaded as a Model, CZML as an Entity, 3D Tiles as a tileset, each by CesiumJS on the page of `fig2mesh globe`. "
+        "GLB is loaded as a Model, CZML as an Entity, 3D Tiles as they are, by CesiumJS on the page of `fig2mesh globe`. "
         "USD is evaluated by pxr and placed as Cesium for Omniverse documents it, so there is no picture of it.",
     ]
     return "\n".join(lines) + "\n"

@@ -43,7 +43,7 @@ def test_size_orientation_material_and_picture(tmp_path: Path, suffix: str) -> N
     assert mesh["textures"] == [[64, 64]]
     assert mesh["faces_of_materials"] == [mesh["faces"]]
     if suffix in (".glb", ".gltf"):
-        # Which part a vertex belongs to is kept as a number; names and shares are in a table that Blender does not read.
+        # The part of a vertex is kept as a number; names and shares are in a table that Blender does not read.
         assert "_FEATURE_ID_0" in mesh["attributes"]
 
     with Image.open(tmp_path / "front.png") as image:

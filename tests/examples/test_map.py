@@ -1,4 +1,4 @@
-"""The pictorial map: its script draws it, its world file places it, and its people come to stand where it shows them."""
+"""The pictorial map: its script draws it, its world file places it, its people come to stand where it shows them."""
 
 from __future__ import annotations
 

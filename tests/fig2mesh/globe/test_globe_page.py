@@ -37,7 +37,8 @@ LOOK = """(async () => {{
   const enu = Matrix4.inverseTransformation(Transforms.eastNorthUpToFixedFrame(feet), new Matrix4());
   const eye = Matrix4.multiplyByPoint(enu, camera.positionWC, new Cartesian3());
   scene.render();
-  return {{ eye: Cesium.Math.toDegrees(Cesium.Math.zeroToTwoPi(Math.atan2(eye.x, eye.y))), ground: fig2mesh.state.ground,
+  const bearing = Cesium.Math.zeroToTwoPi(Math.atan2(eye.x, eye.y));
+  return {{ eye: Cesium.Math.toDegrees(bearing), ground: fig2mesh.state.ground,
     parts: [...document.querySelectorAll('#parts button')].map((button) => button.textContent) }};
 }})()"""
 
@@ -208,7 +209,8 @@ def test_observed_or_inferred_is_shown_by_texels_where_a_file_has_them(
 ) -> None:
     (tmp_path / "fine.glb").write_bytes(with_observed(glb_bytes(asset(ZURICH)), half_observed()))
     actions = [
-        {"evaluate": BARE}, {"evaluate": LOOK.format(index=0)}, {"evaluate": "fig2mesh.setMode(true)"}, {"screenshot": True},
+        {"evaluate": BARE}, {"evaluate": LOOK.format(index=0)},
+        {"evaluate": "fig2mesh.setMode(true)"}, {"screenshot": True},
         {"evaluate": "(fig2mesh.viewer.camera.rotateLeft(Math.PI), fig2mesh.viewer.scene.requestRender())"},
         {"screenshot": True}, {"evaluate": "document.getElementById('grain').textContent"},
         {"key": "o"}, {"screenshot": True},
