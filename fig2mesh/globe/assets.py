@@ -78,7 +78,9 @@ def _read(path: Path) -> GlobeAsset:
         remedy = "give .glb, .gltf, tileset.json, .czml or .geojson"
         raise InputError(path, f"a globe shows no {path.suffix or 'file without a suffix'}", remedy)
     try:
-        return {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
+        found = {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
+        json.dumps(found.facts, allow_nan=False)  # files may hold numbers that no page can
+        return found
     except (AttributeError, KeyError, IndexError, TypeError, ValueError, RecursionError) as error:
         if isinstance(error, InputError):
             raise

@@ -261,7 +261,7 @@ def table(found: list[Found]) -> str:
         lines.append(f"| {each.place} | {where} | {place.heading_deg:g}° | {each.format} | {numbers} |")
     lines += [
         "",
-        "GLB is loaded as a Model, CZML as an Entity, 3D Tiles as they are, by CesiumJS on the page of `fig2mesh globe`. "
+        "GLB is loaded as a Model, CZML as an Entity, 3D Tiles as a tileset, on the page of `fig2mesh globe`. "
         "USD is evaluated by pxr and placed as Cesium for Omniverse documents it, so there is no picture of it.",
     ]
     return "\n".join(lines) + "\n"
