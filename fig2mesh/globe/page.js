@@ -28,7 +28,12 @@ async function start() {
   const groups = await Promise.all(given.assets.map((asset) => LOADERS[asset.kind](viewer, asset)));
   for (const group of groups) {
     figures.push(...group);
-    group.late = (fresh) => { figures.push(...fresh); fresh.forEach(label); list(); };
+    group.late = (figure, listed) => {
+      if (listed) figures[figures.indexOf(listed)] = figure;
+      else { figures.push(figure); label(figure); }
+      if (state.current === listed) state.current = figure;
+      list();
+    };
     group.painted = (tile) => { for (const figure of group) if (figure.owns({ content: tile.content })) paintFigure(figure); };
   }
 
@@ -96,18 +101,20 @@ async function start() {
     if (seconds > 0) {
       await new Promise((done) => camera.flyToBoundingSphere(sphere, { offset, duration: seconds, complete: done, cancel: done }));
     }
-    if (state.current === figure) lock(figure, offset);
+    if (state.current === (figure.real ?? figure)) lock(figure, offset);
     await drawn(figure);
-    describe(figure);
-    paintFigure(figure);
+    if (state.current !== (figure.real ?? figure)) return;
+    describe(state.current);
+    paintFigure(state.current);
   }
 
   // Until what the figure consists of is loaded.
-  function drawn(figure) {
+  function drawn(asked) {
     return new Promise((done) => {
       let frames = 0;
       const wait = () => {
-        const waiting = figure.pending?.() || (figure.kind === 'tiles' && (!figure.drawn.tilesLoaded || figure.shownLevel() < 0));
+        const figure = asked.real ?? asked;
+        const waiting = figure.distant ||  figure.pending?.() || (figure.kind === 'tiles' && (!figure.drawn.tilesLoaded || figure.shownLevel() < 0));
         if ((!waiting && frames > 1) || ++frames > 600) { remove(); done(); } else scene.requestRender();
       };
       const remove = scene.postRender.addEventListener(wait);
@@ -130,6 +137,8 @@ async function start() {
   }
 
   const row = (term, value) => (value === undefined || value === null || value === '' ? [] : [make('dt', term), make('dd', String(value))]);
+  // Said above in other words.
+  const SHOWN = /^(heading|heading_deg|longitude|latitude|height|height_m|parts|partsObservedShare)$/;
   const plain = (value) => (typeof value === 'object' && value !== null ? JSON.stringify(value) : value);
 
   function describe(figure) {
@@ -144,7 +153,7 @@ async function start() {
         ...row('ground', `${place.height_m.toFixed(2)} m`), ...row('nose to', `${place.heading_deg.toFixed(2)}°`),
       ] : []),
       ...row('height', figure.size >= 1000 ? `${(figure.size / 1000).toFixed(2)} km` : `${figure.size.toFixed(2)} m`),
-      ...Object.entries(rest).slice(0, 12).flatMap(([key, value]) => row(key, String(plain(value)).slice(0, 120))),
+      ...Object.entries(rest).filter(([key]) => !SHOWN.test(key)).slice(0, 12).flatMap(([key, value]) => row(key, String(plain(value)).slice(0, 120))),
     );
     const names = [...new Set(figure.features().map((feature) => feature.getProperty('name')).filter((name) => name !== undefined))];
     find('parts').replaceChildren(...names.map((name) => {
@@ -217,7 +226,8 @@ async function start() {
   // What is at a pixel: {figure, part}.
   function at(position) {
     const picked = scene.pick(position);
-    const figure = picked && (picked.id?.figure ?? figures.find((each) => each.owns(picked)));
+    const named = picked?.id?.figure;
+    const figure = picked && (named?.real ?? named ?? figures.find((each) => each.owns(picked)));
     return { figure, part: figure ? picked.getProperty?.('name') ?? null : null };
   }
 

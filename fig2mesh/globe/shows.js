@@ -27,6 +27,7 @@ const featuresOfModel = (model) => {
   const table = model?.featureTables?.[model.featureTableId];
   return table ? Array.from({ length: table.featuresLength }, (_, i) => table.getFeature(i)) : [];
 };
+const stemOf = (uri) => decodeURIComponent(uri.split('/').at(-1)).replace(/(_lod\d+)?\.\w+$/, '');
 const featuresOfContent = (content) => Array.from({ length: content.featuresLength }, (_, i) => content.getFeature(i));
 
 async function loadModel(viewer, given) {
@@ -57,13 +58,16 @@ async function loadModel(viewer, given) {
 }
 
 // A figure is the topmost tile with a model on its branch; the chain below it is its levels, coarse to fine.
+const uriOf = (header) => header.content?.uri ?? header.content?.url ?? header.contents?.[0]?.uri;
+const isTileset = (uri) => /\.json$/i.test(uri.split('?')[0]);
+
 function figureTiles(root) {
   const found = [];
   const pending = [root];
   while (pending.length) {
     const tile = pending.pop();
-    const uri = tile._header.content?.uri ?? tile._header.content?.url ?? tile._header.contents?.[0]?.uri;
-    if (uri && !/\.json$/i.test(uri.split('?')[0])) found.push(tile);
+    const uri = uriOf(tile._header);
+    if (uri && !isTileset(uri)) found.push(tile);
     else pending.push(...[...tile.children].reverse());
   }
   return found;
@@ -75,8 +79,45 @@ function chainOf(tile) {
   return tiles.reverse();
 }
 
-const valueOf = (metadata, name) => (metadata?.hasProperty?.(name) ? metadata.getProperty(name) : undefined);
-const allOf = (metadata) => Object.fromEntries((metadata?.getPropertyIds?.([]) ?? []).map((id) => [id, metadata.getProperty(id)]));
+// What a file says of a figure: metadata of 3D Tiles 1.1, extras of 1.0.
+function saidOf(header, given) {
+  const facts = header.metadata?.properties ?? header.extras ?? given.metadata;
+  const { name, copyright, credit = copyright ?? given.credit, figureHeight, figure_height_m, ...metadata } = facts;
+  return { name: name ?? given.name, credit, metadata, tall: figureHeight ?? figure_height_m };
+}
+
+const ecefFromContent = (transform) => Cesium.Matrix4.multiply(transform, Cesium.Axis.Y_UP_TO_Z_UP, new Cesium.Matrix4());
+
+// Figures in files that CesiumJS has not opened yet, as it opens those that the camera is near: to be listed and flown to.
+async function distantFigures(url, given, transform, opened, found = []) {
+  const { BoundingSphere, Cartesian3, Matrix3, Matrix4, OrientedBoundingBox } = Cesium;
+  const { root } = await (await fetch(url)).json();
+  const pending = [{ header: root, above: transform }];
+  while (pending.length) {
+    const { header, above } = pending.pop();
+    const matrix = header.transform ? Matrix4.multiply(above, Matrix4.unpack(header.transform), new Matrix4()) : above;
+    const uri = uriOf(header);
+    if (uri && isTileset(uri)) {
+      await distantFigures(new URL(uri, new URL(url, location.href)).href, given, matrix, false, found);
+    } else if (uri) {
+      const { box } = header.boundingVolume;
+      if (opened || !box) continue;
+      const centre = Matrix4.multiplyByPoint(matrix, Cartesian3.unpack(box), new Cartesian3());
+      const axes = Matrix3.multiply(Matrix4.getMatrix3(matrix, new Matrix3()), Matrix3.unpack(box, 3), new Matrix3());
+      const sphere = BoundingSphere.fromOrientedBoundingBox(new OrientedBoundingBox(centre, axes));
+      const place = placeOf(ecefFromContent(matrix));
+      const { tall, ...said } = saidOf(header, given);
+      found.push({
+        kind: 'tiles', ...said, distant: true, drawn: null, sphere: () => BoundingSphere.clone(sphere), place: () => place,
+        ground: place ? place.height_m : 0, size: tall ?? 2 * sphere.radius, models: () => [], features: () => [], levels: [],
+        shownLevel: () => -1, owns: () => false, show: () => {},
+      });
+      continue;
+    }
+    pending.push(...(header.children ?? []).map((child) => ({ header: child, above: matrix })).reverse());
+  }
+  return found;
+}
 
 async function loadTileset(viewer, given) {
   const { BoundingSphere, Matrix3, Matrix4, Cartesian3 } = Cesium;
@@ -91,34 +132,29 @@ async function loadTileset(viewer, given) {
     const chain = chainOf(tile);
     chain.forEach((each, level) => { levelOf.set(each, level); errors.set(each, each.geometricError); });
     const mine = new Set(chain);
-    const metadata = tile.metadata ?? tile.content?.metadata ?? tile.content?.group?.metadata;
-    const facts = { ...given.metadata, ...allOf(metadata) };
-    const { name = given.name, copyright, credit = copyright ?? given.credit, ...rest } = facts;
+    const { tall, ...said } = saidOf(tile._header, given);
     const volume = tile.boundingVolume.boundingVolume;
-    const up = volume?.halfAxes ? Matrix3.getColumn(volume.halfAxes, 2, new Cartesian3()) : null;
-    const matrix = Matrix4.multiply(tile.computedTransform, Cesium.Axis.Y_UP_TO_Z_UP, new Matrix4());
-    const place = placeOf(matrix);
-    const shownTile = () => chain.find((each) => visible.has(each));
+    const up = volume?.halfAxes ? 2 * Cartesian3.magnitude(Matrix3.getColumn(volume.halfAxes, 2, new Cartesian3())) : undefined;
+    const place = placeOf(ecefFromContent(tile.computedTransform));
     return {
-      kind: 'tiles', name: valueOf(metadata, 'name') ?? name, credit, metadata: rest, drawn: tileset, tile,
+      kind: 'tiles', ...said, drawn: tileset, tile,
       sphere: () => BoundingSphere.clone(tile.boundingSphere), place: () => place, ground: place ? place.height_m : 0,
-      size: up ? 2 * Cartesian3.magnitude(up) : 2 * tile.boundingSphere.radius,
+      size: tall ?? up ?? 2 * tile.boundingSphere.radius,
       models: () => chain.map((each) => each.content?._model).filter(Boolean),
       features: () => chain.filter((each) => each.contentReady).flatMap((each) => featuresOfContent(each.content)),
       levels: chain.map((each) => ({ error: errors.get(each), get triangles() { return each.contentReady ? each.content.trianglesLength : undefined; } })),
-      shownLevel: () => { const found = shownTile(); return found ? levelOf.get(found) : -1; },
+      shownLevel: () => levelOf.get(chain.find((each) => visible.has(each))) ?? -1,
       owns: (picked) => mine.has(picked.content?.tile ?? picked.content?._tile),
       show: (on) => { tileset.show = on; },
     };
   };
 
-  const found = [];
-  const add = (root) => {
-    const fresh = figureTiles(root).filter((tile) => !levelOf.has(tile)).map(make);
-    found.push(...fresh);
-    return fresh;
-  };
-  add(tileset.root);
+  const found = figureTiles(tileset.root).map(make);
+  // Several models without a name each: told apart by their files.
+  if (found.length > 1) for (const each of found) if (each.name === given.name) each.name = stemOf(uriOf(each.tile._header));
+  const distant = await distantFigures(given.url, given, Matrix4.IDENTITY, true);
+  found.push(...distant);
+
   const force = (tile) => {
     const level = levelOf.get(tile);
     if (level === undefined) return;
@@ -128,12 +164,18 @@ async function loadTileset(viewer, given) {
   Object.assign(found, {
     forced: null,
     force: (level) => { found.forced = level; for (const tile of levelOf.keys()) force(tile); },
-    drawn: tileset,
   });
-  // Tilesets within tilesets arrive late.
   tileset.tileLoad.addEventListener((tile) => {
-    if (tile.hasTilesetContent) found.late?.(tile.children.flatMap(add));
-    if (found.forced !== null) force(tile);
+    if (tile.hasTilesetContent) {
+      // A tileset within this one: its figures take the places of those that were only listed.
+      for (const figure of tile.children.flatMap(figureTiles).filter((each) => !levelOf.has(each)).map(make)) {
+        const { center } = figure.sphere();
+        const listed = distant.find((each) => !each.real && each.name === figure.name && Cartesian3.distance(each.sphere().center, center) < 1);
+        if (listed) listed.real = figure;
+        found.late?.(figure, listed);
+      }
+      if (found.forced !== null) found.force(found.forced);
+    }
     found.painted?.(tile);
   });
   return found;
@@ -152,7 +194,7 @@ async function loadCzml(viewer, given) {
   return named.map((entity) => {
     const at = entity.position.getValue(now);
     const properties = entity.properties?.getValue(now) ?? {};
-    const { credit = properties.copyright ?? given.credit, ...rest } = properties;
+    const { credit = properties.copyright ?? given.credit, figure_height_m: tall, ...rest } = properties;
     const clamp = ![undefined, HeightReference.NONE].includes(entity.model?.heightReference?.getValue(now));
     const ready = () => { const model = modelOf(entity); return model?.ready ? model : undefined; };
     const place = () => {
@@ -163,7 +205,7 @@ async function loadCzml(viewer, given) {
       const axes = Matrix4.multiply(Cesium.Axis.Z_UP_TO_X_UP, Cesium.Axis.Y_UP_TO_Z_UP, new Matrix4());
       return placeOf(Matrix4.multiply(local, axes, new Matrix4()));
     };
-    const size = () => 2 * (ready()?.boundingSphere.radius ?? 1);
+    const size = () => tall ?? 2 * (ready()?.boundingSphere.radius ?? 1);
     return {
       kind: 'czml', name: entity.name ?? entity.id, credit, metadata: rest, drawn: null, entity,
       sphere: () => ready()?.boundingSphere ?? new BoundingSphere(at, 1), place,
@@ -188,7 +230,8 @@ async function loadGeoJson(viewer, given) {
     const heading = Number(rest.heading_deg);
     return {
       kind: 'geojson', name: entity.name ?? name ?? `${given.name} ${index + 1}`, credit, metadata: rest, drawn: null, entity,
-      sphere: () => sphere, ground: 0, size: 2 * sphere.radius, models: () => [], features: () => [], levels: [], shownLevel: () => -1,
+      sphere: () => sphere, ground: at.height > 0 || at.height < 0 ? at.height : 0, size: rest.figure_height_m ?? 2 * sphere.radius,
+      models: () => [], features: () => [], levels: [], shownLevel: () => -1,
       place: () => ({
         lon_deg: Cesium.Math.toDegrees(at.longitude), lat_deg: Cesium.Math.toDegrees(at.latitude), height_m: at.height,
         heading_deg: Number.isFinite(heading) ? heading : 180, feet: Cartesian3.clone(sphere.center),
