@@ -285,6 +285,9 @@ async function start() {
 
   figures.forEach(label);
   list();
+  // CesiumJS shows the credits of models and tiles itself.
+  const credits = figures.filter((figure) => !figure.drawn).map((figure) => figure.credit).filter(Boolean);
+  for (const credit of new Set(credits)) viewer.creditDisplay.addStaticCredit(new Cesium.Credit(make('b', credit).innerHTML, true));
   window.fig2mesh = { viewer, figures, state, look, home, drawn, setLevel, setMode, setGrid, choosePart, at, ecefFromMesh, placeOf };
   if (figures.length === 1) await look(figures[0], 0);
   else if (figures.length) { home(); state.current = figures[0]; describe(figures[0]); }

@@ -2,7 +2,7 @@
 //
 // stdin:  {browser, url, width, height, actions: [{...}, ...]}; an action is one of
 //         {picture: {yaw, pitch, effects}}   draw the figure on a canvas of width x height; effects as a list
-//         {drag: [dx, dy]}  {touch: [dx, dy]}  {pinch: [from, to]}  {wheel: dy}  {key: name}  {toggle: effect}
+//         {drag: [dx, dy]}  {click: [x, y]}  {touch: [dx, dy]}  {pinch: [from, to]}  {wheel: dy}  {key: name}  {toggle: effect}
 //         {evaluate: expression}  {screenshot: true}
 // stdout: {results: [...], messages: [...], requests: [...]}: for each action the page's state after it, with `png`
 //         (base64) or `value`; what the page wrote to its console; addresses asked for that are not in the page itself
@@ -61,6 +61,7 @@ const acts = {
     await page.mouse.wheel(0, dy);
     await page.waitForTimeout(100);
   },
+  click: ([px, py]) => page.mouse.click(px, py),
   key: (name) => page.keyboard.press(name),
   toggle: (effect) => page.locator(`#${effect}`).click(),
   evaluate: async (expression) => ({ value: await page.evaluate(expression) }),

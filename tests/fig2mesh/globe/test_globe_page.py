@@ -71,6 +71,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory, look: Look, cesium: Path) -> 
     middle = f"new Cesium.Cartesian2({SIZE / 2}, {SIZE / 2})"
     actions: dict[str, dict[str, Any]] = {
         "at first": {"evaluate": "document.getElementById('figures').textContent"},
+        "credits": {"evaluate": "document.querySelector('.cesium-viewer-bottom').textContent"},
         "bare": {"evaluate": BARE},
         "model": {"evaluate": LOOK.format(index=1)},
         "model picture": {"screenshot": True},
@@ -80,6 +81,10 @@ def seen(tmp_path_factory: pytest.TempPathFactory, look: Look, cesium: Path) -> 
         "part picture": {"screenshot": True},
         "unpart": {"key": "Escape"},
         "unpicked": {"evaluate": "fig2mesh.state.part"},
+        "mouse": {"click": [SIZE // 2, SIZE // 2]},
+        "clicked": {"evaluate": "fig2mesh.state.part"},
+        "unclick": {"click": [5, 5]},
+        "unclicked": {"evaluate": "fig2mesh.state.part"},
         "observed": {"key": "o"},
         "grain": {"evaluate": "[fig2mesh.state.mode, document.getElementById('grain').textContent]"},
         "observed picture": {"screenshot": True},
@@ -113,6 +118,7 @@ def linear(srgb: np.ndarray) -> np.ndarray:
 @pytest.mark.slow
 def test_all_kinds_are_listed_with_place_and_credit(seen: dict[str, Any]) -> None:
     assert seen["at first"] == "farmermodelmarkedpin"
+    assert "of the packet" in seen["credits"]
     tiles, model, entity, pin = seen["facts"]
     assert [each["kind"] for each in (tiles, model, entity, pin)] == ["tiles", "model", "czml", "geojson"]
     for facts, place in ((tiles, ZURICH), (model, EAST), (entity, NORTH)):
@@ -141,6 +147,7 @@ def test_parts_are_picked_named_and_stand_out(seen: dict[str, Any]) -> None:
     assert seen["pick"] == "torso"
     assert seen["part"] == "part: head, the drawing showed 50 % of it"
     assert seen["unpicked"] is None
+    assert (seen["clicked"], seen["unclicked"]) == ("torso", None)
     before, after = (pixels(seen[f"{name} picture"])[..., :3].astype(int) for name in ("model", "part"))
     rows = np.flatnonzero((before < 250).any(axis=2)[:, SIZE // 2])
     top, torso = rows[len(rows) // 10], rows[len(rows) // 2]
