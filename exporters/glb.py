@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from exporters.asset import Asset, TexturedMesh
 from exporters.errors import ExportError
 from exporters.georeference import georeference
+from exporters.part_borders import split_at_parts
 from exporters.sampling import linear_from_srgb, observed_shares
 from exporters.solid import measure_topology, solid_of, unit_normals
 
@@ -145,7 +146,7 @@ def _text(document: _Document) -> bytes:
 
 
 def _build(asset: Asset, lod: int) -> _Document:
-    mesh = asset.lods[lod]
+    mesh = split_at_parts(asset.lods[lod])
     if not len(mesh.faces):
         raise ExportError(asset.name, f"level of detail {lod} has no triangles", "give a mesh with triangles")
     document = _Document()
