@@ -20,7 +20,7 @@ PYTHON = (3, 11)
 
 
 def blender_python() -> Path:
-    """The interpreter that has bpy; made and installed (370 MB to load, 1 GB on the disk) on first use."""
+    """The interpreter that has bpy; made and installed (1.6 GB on the disk, half a minute) on first use."""
     interpreter = ENVIRONMENT / "bin" / "python"
     done = ENVIRONMENT / "installed.json"
     if not done.is_file() or json.loads(done.read_text()) != list(PACKAGES):
