@@ -28,6 +28,7 @@ from exporters.gltf_material import linear_rgba, material, texture_file
 from exporters.gltf_parts import features, manifold
 from exporters.ktx2 import padded
 from exporters.meshopt import quantised, quantised_uv, reordered
+from exporters.part_borders import split_at_parts
 from exporters.profiles import GENERAL, Profile
 from exporters.solid import unit_normals
 
@@ -75,7 +76,7 @@ def write_gltf(asset: Asset, path: Path | str, profile: Profile = GENERAL) -> No
 
 def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture | None]:
     """The document without the bytes of its image, and that image."""
-    mesh = asset.lods[lod]
+    mesh = split_at_parts(asset.lods[lod])
     if not len(mesh.faces):
         raise ExportError(asset.name, f"level of detail {lod} has no triangles", "give a mesh with triangles")
     document = Document(profile.compressed)

@@ -1,8 +1,8 @@
-// What a browser makes of a page of `fig2mesh view`.
+// What a browser makes of a page of `fig2mesh view` or `fig2mesh globe`.
 //
 // stdin:  {browser, url, width, height, actions: [{...}, ...]}; an action is one of
 //         {picture: {yaw, pitch, effects}}   draw the figure on a canvas of width x height; effects as a list
-//         {drag: [dx, dy]}  {touch: [dx, dy]}  {pinch: [from, to]}  {wheel: dy}  {key: name}  {toggle: effect}
+//         {drag: [dx, dy]}  {click: [x, y]}  {touch: [dx, dy]}  {pinch: [from, to]}  {wheel: dy}  {key: name}  {toggle: effect}
 //         {evaluate: expression}  {screenshot: true}
 // stdout: {results: [...], messages: [...], requests: [...]}: for each action the page's state after it, with `png`
 //         (base64) or `value`; what the page wrote to its console; addresses asked for that are not in the page itself
@@ -61,6 +61,7 @@ const acts = {
     await page.mouse.wheel(0, dy);
     await page.waitForTimeout(100);
   },
+  click: ([px, py]) => page.mouse.click(px, py),
   key: (name) => page.keyboard.press(name),
   toggle: (effect) => page.locator(`#${effect}`).click(),
   evaluate: async (expression) => ({ value: await page.evaluate(expression) }),
@@ -68,6 +69,7 @@ const acts = {
 };
 
 const state = () => {
+  if (!window.fig2mesh.view) return {}; // a globe with models
   const { view, program } = window.fig2mesh;
   const { compiles, defines, source } = program;
   return { ...view.camera, compiles, defines, lines: source.split('\n').length, height: view.height, centre: view.centre };

@@ -38,13 +38,17 @@ def test_shipped_figures_become_valid_models(tmp_path: Path, name: str) -> None:
     assert len(np.unique(pixels // 32, axis=0)) > 20, "a picture of a coloured figure"
 
 
-def test_readme_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_readme_commands_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:  # fmt: skip
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     commands = readme_commands()
     assert {words[0] for words in commands} >= {"inspect", "validate", "doctor"}
     for words in commands:
-        draft = [] if words[0] in ("inspect", "validate", "doctor") else ["--quality", "draft", "-q"]
+        draft = [] if words[0] in ("inspect", "validate", "doctor", "globe") else ["--quality", "draft", "-q"]
         # Small pictures; and a page that is written, not served until it is stopped.
         draft += {"render": ["--size", "60", "80"], "view": ["-o", "page.html"]}.get(words[0], [])
+        if words[0] == "globe":
+            draft += ["-q", "-o", "globe", "--cesium", str(request.getfixturevalue("cesium"))]
         assert main([*words, *draft]) == 0, words
