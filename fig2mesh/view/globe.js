@@ -15,23 +15,13 @@ function fail(error) {
 }
 
 async function start() {
-  if (!window.Cesium) throw new Error('CesiumJS is not there: put the folder Build/Cesium of the npm package cesium beside this page, as "cesium".');
+  const viewer = offlineViewer('globe', { maximumRenderTimeChange: Infinity });
+  const { scene, camera } = viewer;
   const { Cartesian3, Matrix4, Math: Angle } = Cesium;
-  Cesium.Ion.defaultAccessToken = undefined;
   const figure = JSON.parse(find('figure').textContent);
   const place = JSON.parse(find('place').textContent);
   const canvas = document.createElement('canvas');
   const view = new FigureView(canvas, figure, await decodeFigure(figure), find('shader').textContent);
-
-  const imagery = Cesium.TileMapServiceImageryProvider.fromUrl(Cesium.buildModuleUrl('Assets/Textures/NaturalEarthII'));
-  const viewer = new Cesium.Viewer('globe', {
-    baseLayer: Cesium.ImageryLayer.fromProviderAsync(imagery),
-    terrainProvider: new Cesium.EllipsoidTerrainProvider(),
-    baseLayerPicker: false, geocoder: false, animation: false, timeline: false, homeButton: false,
-    sceneModePicker: false, navigationHelpButton: false, infoBox: false, selectionIndicator: false,
-    fullscreenButton: false, requestRenderMode: true, maximumRenderTimeChange: Infinity,
-  });
-  const { scene, camera } = viewer;
 
   // The square picture shows everything around the figure's centre that any side of it may show; so its middle lies
   // where the centre does, from wherever the camera looks.

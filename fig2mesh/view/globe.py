@@ -6,8 +6,9 @@ import html
 import json
 from collections.abc import Collection
 
-from fig2mesh.view.page import asset, figure_json, filled
+from fig2mesh.view.page import figure_json
 from fig2mesh.view.scene import Scene
+from fig2mesh.view.template import asset, filled
 from georef.placement import GeoPlacement
 
 
@@ -32,6 +33,7 @@ def globe_page(scene: Scene, placement: GeoPlacement, cesium: str, effects: Coll
             "place": json.dumps(place).replace("</", "<\\/"),
             "shader": asset("shader.glsl"),
             "figure": figure_json(scene, effects),
+            "offline": asset("offline_viewer.js"),
             "view": asset("view.js"),
             "globe": asset("globe.js"),
         },

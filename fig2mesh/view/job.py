@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import logging
-import webbrowser
 from pathlib import Path
 from typing import Any
-
-import click
 
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.job import check_text, configure_logging, placement_for, progress, torch_device, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings, settings_for
+from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.globe import globe_page
 from fig2mesh.view.page import EFFECTS, view_page
 from fig2mesh.view.scene import Scene, make_scene
-from fig2mesh.view.server import address_of, page_server
+from fig2mesh.view.server import page_server, show
 
 log = logging.getLogger("fig2mesh")
-
-CESIUM = "cesium"
-"""Where a page finds CesiumJS, relative to its own address."""
 
 
 def run(
@@ -62,7 +57,7 @@ def run(
         check_text(output, overwrite, "-o", "name")
     if cesium is not None and (placement is None or output is not None):
         raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
-    folders = {CESIUM: find_cesium(cesium)} if placement is not None and output is None else {}
+    folders = {CESIUM: find_cesium(cesium, "--lonlat")} if placement is not None and output is None else {}
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
     settings = settings_for(
         quality, parts=parts, textures=textures, contours=contours, device=torch_device(device), seed=seed
@@ -78,16 +73,7 @@ def run(
         write_text(output, page, "name")
         log.info("%s: %.1f MB", output, len(page) / 1e6)
         return
-    with page_server(page, port, folders) as shown:
-        address = address_of(shown)
-        click.echo(address)
-        log.info("Ctrl-C ends it")
-        if open_:
-            webbrowser.open(address)
-        try:
-            shown.serve_forever()
-        except KeyboardInterrupt:
-            log.info("ended")
+    show(page_server(page, port, folders), open_)
 
 
 def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any = lambda name: None) -> Scene:
@@ -105,18 +91,6 @@ def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any =
     lift, body, sources = results["lift"], results["body"], results["textures"]
     contours = settings.contours == "keep"
     return make_scene(figure.name, body, sources, image_frame(figure), lift, height_m, contours)
-
-
-def find_cesium(folder: Path | None) -> Path:
-    """The folder of CesiumJS as built for pages, in the npm package that was named, or that npm put beside us."""
-    here = Path.cwd()
-    tried = [folder] if folder is not None else [up / "node_modules" / "cesium" for up in (here, *here.parents)]
-    for package in tried:
-        for built in (package / "Build" / "Cesium", package):
-            if (built / "Cesium.js").is_file():
-                return built
-    found = f"no CesiumJS in {folder}" if folder is not None else "no CesiumJS in node_modules"
-    raise InputError("--lonlat" if folder is None else "--cesium", found, "npm install cesium, or pass --cesium DIR")
 
 
 def _effects(text: str) -> tuple[str, ...]:

@@ -7,13 +7,13 @@ import html
 import io
 import json
 import zlib
-from collections.abc import Collection, Mapping
-from importlib.resources import files
+from collections.abc import Collection
 from typing import Any, Final
 
 from PIL import Image
 
 from fig2mesh.view.scene import LINE_COLOUR, LINE_WIDTH, Scene
+from fig2mesh.view.template import asset, filled
 
 EFFECTS: Final = {
     "texture": "colours of the drawing",
@@ -91,21 +91,6 @@ def figure_json(scene: Scene, effects: Collection[str] | None = None) -> str:
     }
     # "</" would end the script element.
     return json.dumps(facts, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-
-
-def asset(name: str) -> str:
-    """The text of a file that lies beside this module."""
-    return files("fig2mesh.view").joinpath(name).read_text(encoding="utf-8")
-
-
-def filled(template: str, values: Mapping[str, str]) -> str:
-    """The template with each {{name}} replaced; what is put in is not looked at again."""
-    pieces = asset(template).split("{{")
-    text = [pieces[0]]
-    for piece in pieces[1:]:
-        name, rest = piece.split("}}", 1)
-        text += [values[name], rest]
-    return "".join(text)
 
 
 def _encoded(scene: Scene) -> tuple[bytes, str]:

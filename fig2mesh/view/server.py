@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
+import logging
 import posixpath
+import webbrowser
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import click
+
 from fig2mesh.errors import InputError
 
+log = logging.getLogger("fig2mesh")
+
 TYPES = {
-    ".css": "text/css", ".gif": "image/gif", ".html": "text/html", ".jpg": "image/jpeg", ".js": "text/javascript",
-    ".json": "application/json", ".png": "image/png", ".svg": "image/svg+xml", ".wasm": "application/wasm",
-    ".xml": "application/xml",
+    ".css": "text/css", ".czml": "application/json", ".geojson": "application/geo+json", ".gif": "image/gif",
+    ".glb": "model/gltf-binary", ".gltf": "model/gltf+json", ".html": "text/html", ".jpeg": "image/jpeg",
+    ".jpg": "image/jpeg", ".js": "text/javascript", ".json": "application/json", ".png": "image/png",
+    ".svg": "image/svg+xml", ".wasm": "application/wasm", ".webp": "image/webp", ".xml": "application/xml",
 }  # fmt: skip
 """Media types by suffix; not the system's, which on some Windows machines calls scripts plain text."""
 
+UNKNOWN = "application/octet-stream"
 
-def page_server(page: str, port: int = 0, folders: dict[str, Path] | None = None) -> ThreadingHTTPServer:
+
+def page_server(
+    page: str, port: int = 0, folders: dict[str, Path] | None = None, files: dict[str, Path] | None = None
+) -> ThreadingHTTPServer:
     """A server bound to the loopback address that answers / with the page; `serve_forever()` starts it.
 
     port : 0 takes a free one
     folders : first part of an address → folder whose files lie below it
+    files : whole address, without a slash at its start → file
     """
+    single = files or {}
     body = page.encode("utf-8")
     shared = {name: folder.resolve() for name, folder in (folders or {}).items()}
 
@@ -33,13 +46,17 @@ def page_server(page: str, port: int = 0, folders: dict[str, Path] | None = None
             if address in ("/", "/index.html"):
                 self._answer(body, "text/html; charset=utf-8")
                 return
-            name, _, rest = posixpath.normpath(address).lstrip("/").partition("/")
+            plain = posixpath.normpath(address).lstrip("/")
+            if plain in single and single[plain].is_file():
+                self._answer(single[plain].read_bytes(), TYPES.get(single[plain].suffix.lower(), UNKNOWN))
+                return
+            name, _, rest = plain.partition("/")
             path = (shared[name] / rest).resolve() if name in shared and "\0" not in rest else None
             # Links and dots lead nowhere outside of the folder.
             if path is None or not path.is_relative_to(shared[name]) or not path.is_file():
                 self.send_error(HTTPStatus.NOT_FOUND)
                 return
-            self._answer(path.read_bytes(), TYPES.get(path.suffix.lower(), "application/octet-stream"))
+            self._answer(path.read_bytes(), TYPES.get(path.suffix.lower(), UNKNOWN))
 
         def _answer(self, content: bytes, kind: str) -> None:
             self.send_response(HTTPStatus.OK)
@@ -62,3 +79,20 @@ def page_server(page: str, port: int = 0, folders: dict[str, Path] | None = None
 def address_of(server: ThreadingHTTPServer) -> str:
     """What to open in a browser."""
     return f"http://127.0.0.1:{server.server_address[1]}/"
+
+
+def show(server: ThreadingHTTPServer, open_: bool) -> None:
+    """Print the server's address and answer until Ctrl-C.
+
+    open_ : whether to open a browser there
+    """
+    with server:
+        address = address_of(server)
+        click.echo(address)
+        log.info("Ctrl-C ends it")
+        if open_:
+            webbrowser.open(address)
+        try:
+            server.serve_forever()
+        except KeyboardInterrupt:
+            log.info("ended")

@@ -1,4 +1,4 @@
-// What a browser makes of a page of `fig2mesh view`.
+// What a browser makes of a page of `fig2mesh view` or `fig2mesh globe`.
 //
 // stdin:  {browser, url, width, height, actions: [{...}, ...]}; an action is one of
 //         {picture: {yaw, pitch, effects}}   draw the figure on a canvas of width x height; effects as a list
@@ -68,6 +68,7 @@ const acts = {
 };
 
 const state = () => {
+  if (!window.fig2mesh.view) return {}; // a globe with models
   const { view, program } = window.fig2mesh;
   const { compiles, defines, source } = program;
   return { ...view.camera, compiles, defines, lines: source.split('\n').length, height: view.height, centre: view.centre };

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
-from PIL import Image
 
 from fig2mesh.field.analytic import MANNEQUIN, mannequin
 from fig2mesh.field.body import Body
@@ -23,11 +16,6 @@ from fig2mesh.texture.pen import Pen
 from fig2mesh.texture.sources import Sources
 from fig2mesh.view.page import view_page
 from fig2mesh.view.scene import Scene, make_scene
-from tests.node import ROOT, installed, runner
-
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-
-Look = Callable[..., dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -72,30 +60,3 @@ def page(painted: Painted, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("view") / "page.html"
     path.write_text(view_page(painted.scene), encoding="utf-8")
     return path
-
-
-@pytest.fixture(scope="session")
-def look() -> Look:
-    """Open an address in headless Chromium and act there, see tests/clients/view.mjs; Playwright drives it."""
-    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if browser is None:
-        pytest.skip(f"no browser ({', '.join(BROWSERS)}): pages not looked at; apt-get install chromium")
-    run = runner(installed(ROOT / "build" / "browser", "playwright-core"))
-
-    def act(url: str, *actions: dict[str, Any], size: tuple[int, int] = (256, 256)) -> dict[str, Any]:
-        job = {"browser": browser, "url": url, "width": size[0], "height": size[1], "actions": actions}
-        return dict(run("view.mjs", stdin=job))
-
-    return act
-
-
-@pytest.fixture(scope="session")
-def cesium() -> Path:
-    """CesiumJS as built for pages."""
-    return installed(ROOT / "build" / "node", "gltf-validator", "cesium") / "cesium" / "Build" / "Cesium"
-
-
-def pixels(png: str) -> NDArray[np.uint8]:
-    """(H, W, 4) of a PNG in base64."""
-    with Image.open(io.BytesIO(base64.b64decode(png))) as image:
-        return np.asarray(image.convert("RGBA"))

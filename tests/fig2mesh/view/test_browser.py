@@ -12,7 +12,8 @@ from skimage.metrics import structural_similarity
 from fig2mesh.cli import main
 from fig2mesh.view.page import EFFECTS
 from tests.drawn import write_figure
-from tests.fig2mesh.view.conftest import Look, Painted, pixels
+from tests.browser import Look, pixels
+from tests.fig2mesh.view.conftest import Painted
 from tests.fig2mesh.view.reference import picture
 
 PLAIN = ("texture", "light", "smooth-union")

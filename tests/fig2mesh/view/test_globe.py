@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from fig2mesh.view.globe import globe_page
-from fig2mesh.view.server import address_of, page_server
+from fig2mesh.view.server import page_server
 from georef.placement import GeoPlacement
-from tests.fig2mesh.view.conftest import Look, Painted, pixels
+from tests.browser import Look, pixels, serving
+from tests.fig2mesh.view.conftest import Painted
 
 BEARING = 120.0
 HEIGHT_M = 1.79
@@ -51,16 +51,9 @@ def test_the_billboard_stands_at_its_place(painted: Painted, look: Look, cesium:
     steps = [
         ({"evaluate": STAND.format(bearing=bearing, pitch=pitch)}, {"screenshot": True}) for bearing, pitch in VIEWS
     ]
-    with page_server(page, folders={"cesium": cesium}) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        address = address_of(server)
-        try:
-            actions = [{"evaluate": BARE}, *(action for pair in steps for action in pair)]
-            found = look(address, *actions, size=(480, 400))
-        finally:
-            server.shutdown()
-            thread.join()
+    with serving(page_server(page, folders={"cesium": cesium})) as address:
+        actions = [{"evaluate": BARE}, *(action for pair in steps for action in pair)]
+        found = look(address, *actions, size=(480, 400))
     assert found["messages"] == []
     assert all(request.startswith(address) for request in found["requests"])
     facts = [result["value"] for result in found["results"][1::2]]

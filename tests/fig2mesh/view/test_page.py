@@ -19,7 +19,8 @@ from fig2mesh.view import field_atlas as fields
 from fig2mesh.view.colour_atlas import NOTHING, colour_atlas, depth_map
 from fig2mesh.view.field_atlas import Brick, field_atlas
 from fig2mesh.view.globe import globe_page
-from fig2mesh.view.page import EFFECTS, asset, default_effects, figure_json, view_page
+from fig2mesh.view.page import EFFECTS, default_effects, figure_json, view_page
+from fig2mesh.view.template import asset
 from georef.placement import GeoPlacement
 from tests.fig2mesh.view.conftest import Painted
 

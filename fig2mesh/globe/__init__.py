@@ -1,0 +1,1 @@
+"""Models on a globe in the browser: files that CesiumJS reads, whoever wrote them."""

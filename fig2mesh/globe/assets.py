@@ -1,0 +1,208 @@
+"""Files that a globe shows: what they are, which others they need, and what is known before a client opens them.
+
+https://docs.ogc.org/cs/22-025r4/22-025r4.html (tileset.json)
+https://github.com/AnalyticalGraphicsInc/czml-writer/wiki/CZML-Guide
+https://www.rfc-editor.org/rfc/rfc7946 (GeoJSON)
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+from urllib.parse import unquote, urlsplit
+
+from exporters.georeference import placement_of_record
+from exporters.gltf_reader import Gltf, read_gltf
+from fig2mesh.errors import InputError
+from georef.geodesy import cesium_entity_heading_deg
+
+Kind = Literal["model", "tileset", "czml", "geojson"]
+
+SUFFIXES: dict[str, Kind] = {
+    ".glb": "model", ".gltf": "model", ".json": "tileset", ".czml": "czml", ".geojson": "geojson",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class GlobeAsset:
+    """A file to be shown and those that it needs.
+
+    kind : what CesiumJS opens it as
+    main : the file itself, relative to `folder`, as in an address
+    folder : what addresses within the files are relative to
+    needs : further files, likewise relative
+    facts : JSON-serialisable: name, credit, metadata, and for models the place and number of triangles
+    """
+
+    kind: Kind
+    main: str
+    folder: Path
+    needs: tuple[str, ...] = ()
+    facts: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files, relative to `folder`."""
+        return (self.main, *self.needs)
+
+
+def find_assets(paths: tuple[Path, ...]) -> tuple[GlobeAsset, ...]:
+    """The assets of files and folders.
+
+    paths : .glb, .gltf, tileset.json, .czml or .geojson; or folders: their tileset.json, or else all models, CZML and
+        GeoJSON files in them
+    Raises InputError for what is not there, of another kind, damaged or without a place on the earth.
+    """
+    return tuple(_read(path) for given in paths for path in _in_folder(given))
+
+
+def _in_folder(path: Path) -> list[Path]:
+    if not path.exists():
+        raise InputError(path, "is not there", "check the name")
+    if not path.is_dir():
+        return [path]
+    if (path / "tileset.json").is_file():
+        return [path / "tileset.json"]
+    found = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES and p.suffix.lower() != ".json")
+    if not found:
+        raise InputError(path, "holds no tileset.json and no models", "give a folder of 3D Tiles, or a file")
+    return found
+
+
+def _read(path: Path) -> GlobeAsset:
+    kind = SUFFIXES.get(path.suffix.lower())
+    if kind is None:
+        remedy = "give .glb, .gltf, tileset.json, .czml or .geojson"
+        raise InputError(path, f"a globe shows no {path.suffix or 'file without a suffix'}", remedy)
+    try:
+        return {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = " ".join(str(error).split())[:120]
+        raise InputError(path, f"damaged ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
+
+
+def _model(path: Path) -> GlobeAsset:
+    gltf = read_gltf(path)
+    asset = gltf.document.get("asset", {})
+    extras = asset.get("extras", {})
+    record = extras.get("georeference")
+    if record is None:
+        raise InputError(path, "has no place on the earth", "write it with --lonlat, or show it as 3D Tiles or CZML")
+    place = placement_of_record(record)
+    names = [item["name"] for item in gltf.items("nodes") if "name" in item]
+    uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
+    facts = {
+        "name": names[0] if names else path.stem,
+        "credit": asset.get("copyright", ""),
+        "metadata": extras.get("metadata", {}),
+        # CesiumJS turns models so that they face east at heading 0.
+        "place": record | {"entity_heading_deg": cesium_entity_heading_deg(place)},
+        "triangles": sum(_triangles(gltf, mesh) for mesh, _ in gltf.instances()),
+    }
+    return GlobeAsset("model", path.name, path.parent, _needed(path, uris), facts)
+
+
+def _triangles(gltf: Gltf, mesh: int) -> int:
+    count = 0
+    for primitive in gltf.items("meshes")[mesh]["primitives"]:
+        accessor = primitive.get("indices", primitive["attributes"]["POSITION"])
+        count += gltf.items("accessors")[accessor]["count"] // 3 if primitive.get("mode", 4) == 4 else 0
+    return count
+
+
+def _tileset(path: Path) -> GlobeAsset:
+    document = _json(path)
+    if not isinstance(document, dict) or "root" not in document or "asset" not in document:
+        raise InputError(path, "is no tileset", "give a tileset.json of 3D Tiles, or .geojson, .czml, .glb")
+    needs, pending, folder = [], [(path, "")], path.parent
+    seen = {path.resolve()}
+    while pending:
+        file, prefix = pending.pop()
+        for uri in _contents(file):
+            relative = prefix + unquote(urlsplit(uri).path)
+            target = folder / relative
+            if urlsplit(uri).scheme or urlsplit(uri).netloc:
+                raise InputError(file, f"its content {uri[:80]} is elsewhere", "give a tileset whose files are here")
+            if target.resolve() in seen:
+                continue
+            _check_there(target, file)
+            seen.add(target.resolve())
+            needs.append(relative)
+            if target.suffix.lower() == ".json":
+                pending.append((target, relative[: len(relative) - len(target.name)]))
+            elif target.suffix.lower() == ".gltf":
+                inside = read_gltf(target)
+                uris = [i["uri"] for kind in ("buffers", "images") for i in inside.items(kind) if "uri" in i]
+                above = relative[: len(relative) - len(target.name)]
+                needs += [above + need for need in _needed(target, uris)]
+    values = document.get("metadata", {}).get("properties", {})
+    facts = {
+        "name": str(values.get("name") or (path.parent.resolve().name if path.name == "tileset.json" else path.stem)),
+        "credit": str(values.get("copyright", "") or document["asset"].get("copyright", "")),
+        "metadata": {key: value for key, value in values.items() if key not in ("name", "copyright")},
+    }
+    return GlobeAsset("tileset", path.name, path.parent, tuple(needs), facts)
+
+
+def _contents(path: Path) -> Iterator[str]:
+    pending = [_json(path)["root"]]
+    while pending:
+        tile = pending.pop()
+        if "implicitTiling" in tile:
+            raise InputError(path, "its tiles are implicit", "give a tileset that lists its tiles")
+        for content in [tile["content"]] if "content" in tile else tile.get("contents", []):
+            yield content["uri"] if "uri" in content else content["url"]  # url: 3D Tiles 0.0
+        pending += tile.get("children", [])
+
+
+def _czml(path: Path) -> GlobeAsset:
+    packets = _json(path)
+    if not isinstance(packets, list) or not packets or packets[0].get("id") != "document":
+        raise InputError(path, "is no CZML", "its first packet must have the id document")
+    uris = []
+    for packet in packets[1:]:
+        model = packet.get("model", {}).get("gltf")
+        address = model.get("uri") if isinstance(model, dict) else model
+        if isinstance(address, str):
+            uris.append(address)
+    facts = {"name": packets[0].get("name") or path.stem, "credit": "", "metadata": {}}
+    return GlobeAsset("czml", path.name, path.parent, tuple(dict.fromkeys(_needed(path, uris))), facts)
+
+
+def _geojson(path: Path) -> GlobeAsset:
+    document = _json(path)
+    if not isinstance(document, dict) or document.get("type") not in ("Feature", "FeatureCollection"):
+        raise InputError(path, "is no GeoJSON of features", "give a Feature or FeatureCollection")
+    return GlobeAsset("geojson", path.name, path.parent, (), {"name": path.stem, "credit": "", "metadata": {}})
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except ValueError as error:
+        raise InputError(path, f"is no JSON ({error})", "write it again") from error
+
+
+def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
+    """Files beside `path`, from addresses in it. Those with their data in them need none."""
+    found = []
+    for uri in uris:
+        parts = urlsplit(uri)
+        if parts.scheme == "data":
+            continue
+        if parts.scheme or parts.netloc:
+            raise InputError(path, f"needs {uri[:80]}, which is elsewhere", "put the file beside it")
+        relative = unquote(parts.path)
+        _check_there(path.parent / relative, path)
+        found.append(relative)
+    return tuple(found)
+
+
+def _check_there(target: Path, by: Path) -> None:
+    if not target.is_file():
+        raise InputError(by, f"needs {target.name}, which is not there", "write it again, whole")

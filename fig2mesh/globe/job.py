@@ -1,0 +1,89 @@
+"""`fig2mesh globe`: show models on a globe, or write the page that does. All side effects are here."""
+
+from __future__ import annotations
+
+import logging
+import os
+import secrets
+import shutil
+from pathlib import Path
+
+from fig2mesh.errors import OutputError
+from fig2mesh.globe.assets import find_assets
+from fig2mesh.globe.page import Overlay, globe_page, page_files
+from fig2mesh.job import configure_logging
+from fig2mesh.view.cesium import CESIUM, find_cesium
+from fig2mesh.view.server import page_server, show
+
+log = logging.getLogger("fig2mesh")
+
+PAGE = "index.html"
+MARK = '<meta name="generator" content="fig2mesh globe">'
+"""By this a folder is known to be one of ours, and may be replaced."""
+
+
+def run(
+    *,
+    assets: tuple[Path, ...],
+    output: Path | None,
+    overlays: tuple[tuple[str, float, float, float, float], ...],
+    cesium: Path | None,
+    port: int,
+    open_: bool,
+    overwrite: bool,
+    quiet: bool,
+    verbose: int,
+) -> None:
+    """What `fig2mesh globe ASSET…` does; the parameters are the options of the command line."""
+    configure_logging(quiet, verbose)
+    if output is not None:
+        _check_folder(output, overwrite)
+    laid = tuple(Overlay(Path(image), *edges) for image, *edges in overlays)
+    found = find_assets(assets)
+    page, files = globe_page(found, laid), page_files(found, laid)
+    built = find_cesium(cesium, "globe")
+    if output is None:
+        show(page_server(page, port, {CESIUM: built}, files), open_)
+        return
+    write_folder(output, page, files, built)
+    size = sum(file.stat().st_size for file in output.rglob("*") if file.is_file())
+    log.info("%s: %.0f MB; serve it, for instance: python -m http.server -d %s", output, size / 1e6, output)
+
+
+def write_folder(folder: Path, page: str, files: dict[str, Path], cesium: Path) -> None:
+    """Write page, files and CesiumJS into a folder that any web server can serve; an older one is replaced whole."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    stage = folder.parent / f".fig2mesh-{os.getpid()}-{secrets.token_hex(4)}.tmp"
+    old = stage.with_suffix(".old")
+    stage.mkdir()
+    try:
+        (stage / PAGE).write_text(page, encoding="utf-8")
+        for address, file in files.items():
+            target = stage / address
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, target)
+        shutil.copytree(cesium, stage / CESIUM, ignore=shutil.ignore_patterns("*.map"))
+        if folder.exists():
+            folder.rename(old)
+        stage.rename(folder)
+    except BaseException:
+        if old.exists() and not folder.exists():
+            old.rename(folder)
+        raise
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _check_folder(folder: Path, overwrite: bool) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise OutputError(folder, "is a file", "give -o a folder")
+    if not any(folder.iterdir()):
+        return
+    page = folder / PAGE
+    if not page.is_file() or MARK not in page.read_text(encoding="utf-8", errors="replace")[:2000]:
+        raise OutputError(folder, "holds other files", "give -o an empty or a new folder")
+    if not overwrite:
+        raise OutputError(folder, "exists already", "use --overwrite or choose another name")

@@ -1,0 +1,284 @@
+// The page: a list of figures, what is known of the one looked at, and switches.
+'use strict';
+
+const MOST_LISTED = 300;
+const PITCH = -8; // degrees; a little from above
+const AWAY = 3.2; // radii of a figure between it and the camera
+
+const find = (id) => document.getElementById(id);
+const make = (tag, text, more = {}) => Object.assign(document.createElement(tag), { textContent: text, ...more });
+
+function fail(error) {
+  find('message').textContent = error?.message ?? String(error);
+  find('message').hidden = false;
+  console.error(error);
+}
+
+async function start() {
+  const viewer = offlineViewer('globe');
+  const { scene, camera } = viewer;
+  const { BoundingSphere, Cartesian3, HeadingPitchRange, Matrix4, Math: Angle, Transforms } = Cesium;
+  const given = JSON.parse(find('given').textContent);
+  const lines = scene.primitives.add(new Cesium.PolylineCollection());
+  const labels = scene.primitives.add(new Cesium.LabelCollection());
+  const state = { current: null, part: null, mode: 'drawn', forced: null, ground: 0, locked: false, grid: true };
+  const figures = [];
+
+  await Promise.all(given.overlays.map((overlay) => layOverlay(viewer, overlay)));
+  const groups = await Promise.all(given.assets.map((asset) => LOADERS[asset.kind](viewer, asset)));
+  for (const group of groups) {
+    figures.push(...group);
+    group.late = (fresh) => { figures.push(...fresh); fresh.forEach(label); list(); };
+    group.painted = (tile) => { for (const figure of group) if (figure.owns({ content: tile.content })) paintFigure(figure); };
+  }
+
+  function label(figure) {
+    const { radius, center } = figure.sphere();
+    labels.add({
+      position: center, text: String(figure.name), font: '14px sans-serif', id: { figure }, scale: 1,
+      style: Cesium.LabelStyle.FILL_AND_OUTLINE, outlineWidth: 3, outlineColor: Cesium.Color.BLACK,
+      horizontalOrigin: Cesium.HorizontalOrigin.CENTER, pixelOffset: new Cesium.Cartesian2(0, -8),
+      // Where the figure itself is too small to be seen.
+      distanceDisplayCondition: new Cesium.DistanceDisplayCondition(60 * Math.max(radius, 1), Number.MAX_VALUE),
+    });
+  }
+
+  function list() {
+    const wanted = find('filter').value.trim().toLowerCase();
+    const matching = figures.filter((figure) => String(figure.name).toLowerCase().includes(wanted));
+    find('figures').replaceChildren(...matching.slice(0, MOST_LISTED).map((figure) => {
+      const button = make('button', figure.name, { type: 'button', onclick: () => look(figure) });
+      button.setAttribute('aria-current', String(figure === state.current));
+      const item = make('li', '');
+      item.append(button);
+      return item;
+    }));
+    find('filter').hidden = figures.length <= 12;
+    find('more').hidden = matching.length <= MOST_LISTED;
+    find('more').textContent = `and ${matching.length - MOST_LISTED} more: find them by name`;
+  }
+
+  function unlock() {
+    camera.cancelFlight();
+    camera.lookAtTransform(Matrix4.IDENTITY);
+    state.locked = false;
+  }
+
+  // The camera goes round the figure until something else is chosen.
+  function lock(figure, offset) {
+    camera.lookAtTransform(Transforms.eastNorthUpToFixedFrame(figure.sphere().center), offset);
+    state.locked = true;
+    scene.requestRender();
+  }
+
+  function setGround(height) {
+    if (Math.abs(height - state.ground) < 0.5 && (height !== 0 || state.ground === 0)) return;
+    state.ground = height;
+    viewer.terrainProvider = groundAt(height);
+  }
+
+  async function look(figure, seconds = matchMedia('(prefers-reduced-motion: reduce)').matches ? 0 : 2.5) {
+    if (state.current && state.part !== null) choosePart(null);
+    state.current = figure;
+    unlock();
+    setGround(figure.ground);
+    const place = figure.place();
+    const sphere = figure.sphere();
+    const towards = Angle.toRadians((place?.heading_deg ?? 180) + 180);
+    const offset = new HeadingPitchRange(towards, Angle.toRadians(PITCH), AWAY * sphere.radius);
+    find('scale').textContent = '';
+    if (place) {
+      const step = drawGrid(lines, place.feet, figure.size);
+      find('scale').textContent = `${step >= 1000 ? `${step / 1000} km` : `${step} m`}, ${step >= 100 ? `${step / 100} km` : `${10 * step} m`}`;
+    }
+    describe(figure);
+    list();
+    if (seconds > 0) {
+      await new Promise((done) => camera.flyToBoundingSphere(sphere, { offset, duration: seconds, complete: done, cancel: done }));
+    }
+    if (state.current === figure) lock(figure, offset);
+    await drawn(figure);
+    describe(figure);
+    paintFigure(figure);
+  }
+
+  // Until what the figure consists of is loaded.
+  function drawn(figure) {
+    return new Promise((done) => {
+      let frames = 0;
+      const wait = () => {
+        const waiting = figure.pending?.() || (figure.kind === 'tiles' && (!figure.drawn.tilesLoaded || figure.shownLevel() < 0));
+        if ((!waiting && frames > 1) || ++frames > 600) { remove(); done(); } else scene.requestRender();
+      };
+      const remove = scene.postRender.addEventListener(wait);
+      scene.requestRender();
+    });
+  }
+
+  function home() {
+    unlock();
+    const all = BoundingSphere.fromBoundingSpheres(figures.map((figure) => figure.sphere()));
+    if (figures.length === 1) { look(figures[0]); return; }
+    const alike = figures[0].place()?.heading_deg ?? 180;
+    const same = figures.every((figure) => Math.abs(((figure.place()?.heading_deg ?? 180) - alike + 540) % 360 - 180) < 45);
+    const pitch = all.radius > 1e6 ? -90 : -25;
+    const offset = new HeadingPitchRange(Angle.toRadians(same ? alike + 180 : 0), Angle.toRadians(pitch), 2.2 * all.radius);
+    if (all.radius < 1e6) setGround(Math.min(...figures.map((figure) => figure.ground)));
+    camera.viewBoundingSphere(all, offset);
+    camera.lookAtTransform(Matrix4.IDENTITY);
+    scene.requestRender();
+  }
+
+  const row = (term, value) => (value === undefined || value === null || value === '' ? [] : [make('dt', term), make('dd', String(value))]);
+  const plain = (value) => (typeof value === 'object' && value !== null ? JSON.stringify(value) : value);
+
+  function describe(figure) {
+    const place = figure.place();
+    const angle = (value, positive, negative) => `${Math.abs(value).toFixed(6)}° ${value < 0 ? negative : positive}`;
+    find('name').textContent = figure.name;
+    const { source, ...rest } = figure.metadata ?? {};
+    find('facts').replaceChildren(
+      ...row('source', plain(source)), ...row('credit', figure.credit),
+      ...(place ? [
+        ...row('place', `${angle(place.lat_deg, 'N', 'S')}, ${angle(place.lon_deg, 'E', 'W')}`),
+        ...row('ground', `${place.height_m.toFixed(2)} m`), ...row('nose to', `${place.heading_deg.toFixed(2)}°`),
+      ] : []),
+      ...row('height', figure.size >= 1000 ? `${(figure.size / 1000).toFixed(2)} km` : `${figure.size.toFixed(2)} m`),
+      ...Object.entries(rest).slice(0, 12).flatMap(([key, value]) => row(key, String(plain(value)).slice(0, 120))),
+    );
+    const names = [...new Set(figure.features().map((feature) => feature.getProperty('name')).filter((name) => name !== undefined))];
+    find('parts').replaceChildren(...names.map((name) => {
+      const button = make('button', name, { type: 'button', onclick: () => choosePart(state.part === name ? null : name) });
+      button.setAttribute('aria-pressed', String(name === state.part));
+      const item = make('li', '');
+      item.append(button);
+      return item;
+    }));
+    const levels = figure.levels.length > 1 ? ['auto', ...figure.levels.keys()] : [];
+    find('levels').replaceChildren(...levels.map((level) => {
+      const text = level === 'auto' ? 'auto' : `LOD ${level}`;
+      const button = make('button', text, { type: 'button', onclick: () => setLevel(level === 'auto' ? null : level) });
+      button.setAttribute('aria-pressed', String((level === 'auto' ? null : level) === state.forced));
+      return button;
+    }));
+    showLevel();
+  }
+
+  function showLevel() {
+    const figure = state.current;
+    const level = figure?.shownLevel() ?? -1;
+    const found = figure?.levels[level];
+    const triangles = found?.triangles === undefined ? '' : `, ${found.triangles.toLocaleString('en')} triangles`;
+    const error = found?.error ? `at most ${(1000 * found.error).toPrecision(3)} mm off` : 'the finest mesh';
+    const text = found ? `shown: LOD ${level}, ${error}${triangles}` : '';
+    if (find('level').textContent !== text) find('level').textContent = text;
+  }
+
+  function setLevel(level) {
+    state.forced = level;
+    for (const group of groups) group.force?.(level === null ? null : level);
+    if (state.current) { describe(state.current); drawn(state.current).then(() => describe(state.current)); }
+    scene.requestRender();
+  }
+
+  function paintFigure(figure) {
+    const grain = paint(figure, state.mode, figure === state.current ? state.part : null);
+    if (figure !== state.current) return;
+    find('grain').textContent = { texel: 'for each point of the surface', part: 'by the share of each part', none: 'the file does not say' }[grain];
+    scene.requestRender();
+  }
+
+  function setMode(observed) {
+    state.mode = observed ? 'observed' : 'drawn';
+    find('observed').checked = observed;
+    find('legend').hidden = !observed;
+    figures.forEach(paintFigure);
+    scene.requestRender();
+  }
+
+  function setGrid(on) {
+    Object.assign(state, { grid: on });
+    Object.assign(lines, { show: on });
+    find('grid').checked = on;
+    scene.requestRender();
+  }
+
+  function choosePart(name) {
+    const figure = state.current;
+    state.part = name;
+    const feature = name === null ? undefined : figure.features().find((each) => each.getProperty('name') === name);
+    const share = feature?.getProperty('observedShare');
+    find('part').hidden = name === null;
+    find('part').textContent = name === null ? '' : `part: ${name}${share === undefined ? '' : `, the drawing showed ${Math.round(100 * share)} % of it`}`;
+    for (const button of find('parts').querySelectorAll('button')) button.setAttribute('aria-pressed', String(button.textContent === name));
+    if (figure) paintFigure(figure);
+  }
+
+  // What is at a pixel: {figure, part}.
+  function at(position) {
+    const picked = scene.pick(position);
+    const figure = picked && (picked.id?.figure ?? figures.find((each) => each.owns(picked)));
+    return { figure, part: figure ? picked.getProperty?.('name') ?? null : null };
+  }
+
+  async function click({ position }) {
+    const { figure, part } = at(position);
+    if (!figure) { choosePart(null); return; }
+    if (figure !== state.current) {
+      if (figure.sphere().radius * 60 < Cartesian3.distance(camera.positionWC, figure.sphere().center)) { await look(figure); return; }
+      choosePart(null);
+      state.current = figure;
+      describe(figure);
+      list();
+    }
+    choosePart(part);
+  }
+
+  function step(by) {
+    const next = state.current === null ? 0 : (figures.indexOf(state.current) + by + figures.length) % figures.length;
+    look(figures[next]);
+  }
+
+  function stepPart(by) {
+    const names = [...find('parts').querySelectorAll('button')].map((button) => button.textContent);
+    if (names.length) choosePart(names[state.part === null ? (by > 0 ? 0 : names.length - 1) : (names.indexOf(state.part) + by + names.length) % names.length]);
+  }
+
+  const nearer = (factor) => {
+    const distance = Cartesian3.magnitude(state.locked ? camera.position : camera.positionWC) - (state.locked ? 0 : 6.37e6);
+    camera.zoomIn(distance * (1 - factor));
+  };
+  const round = { ArrowLeft: 'rotateLeft', ArrowRight: 'rotateRight', ArrowUp: 'rotateUp', ArrowDown: 'rotateDown' };
+  const keys = {
+    n: () => step(1), p: () => step(-1), f: () => state.current && look(state.current), h: home, a: () => setLevel(null),
+    o: () => setMode(state.mode !== 'observed'), g: () => setGrid(!state.grid), '[': () => stepPart(-1), ']': () => stepPart(1),
+    '+': () => nearer(0.8), '=': () => nearer(0.8), '-': () => nearer(1.25), Escape: () => { choosePart(null); unlock(); },
+  };
+
+  document.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches('input[type="search"]')) return;
+    const level = /^[1-5]$/.test(event.key) ? Number(event.key) - 1 : null;
+    if (level !== null && state.current && level < state.current.levels.length) setLevel(level);
+    else if (round[event.key]) camera[round[event.key]](Angle.toRadians(5));
+    else if (keys[event.key]) keys[event.key]();
+    else return;
+    event.preventDefault();
+    scene.requestRender();
+  });
+  viewer.screenSpaceEventHandler.removeInputAction(Cesium.ScreenSpaceEventType.LEFT_DOUBLE_CLICK);
+  viewer.screenSpaceEventHandler.setInputAction((event) => { click(event).catch(fail); }, Cesium.ScreenSpaceEventType.LEFT_CLICK);
+  find('observed').addEventListener('change', (event) => setMode(event.target.checked));
+  find('grid').addEventListener('change', (event) => setGrid(event.target.checked));
+  find('filter').addEventListener('input', list);
+  scene.postRender.addEventListener(showLevel);
+  scene.renderError.addEventListener((_, error) => fail(error));
+
+  figures.forEach(label);
+  list();
+  window.fig2mesh = { viewer, figures, state, look, home, drawn, setLevel, setMode, setGrid, choosePart, at, ecefFromMesh, placeOf };
+  if (figures.length === 1) await look(figures[0], 0);
+  else if (figures.length) { home(); state.current = figures[0]; describe(figures[0]); }
+  document.documentElement.dataset.ready = 'true';
+}
+
+start().catch(fail);
