@@ -46,9 +46,9 @@ def read_figure(
     ------
     FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture
     """
-    rgba = _read_rgba(path)
+    rgba = read_rgba(path)
     height, width = rgba.shape[:2]
-    silhouette = _read_mask(mask, rgba, path)
+    silhouette = read_mask(mask, rgba, path)
     if keypoints is None:
         raise FigureError(path, "no joints given", "pass --keypoints JSON with the 21 joints")
     given = read_keypoints(keypoints, path.name, bbox)
@@ -59,7 +59,7 @@ def read_figure(
             f"made for a picture of {given.size[0]}×{given.size[1]} px, but {path.name} has {width}×{height}",
             "pass the joints that belong to this picture",
         )
-    labels = np.zeros((height, width), np.uint8) if part_labels is None else _read_labels(part_labels, rgba)
+    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, rgba)
     if bbox is not None:
         x0, y0, x1, y1 = bbox
         if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
@@ -116,7 +116,8 @@ def _open(path: Path, what: str) -> Image.Image:
         raise FigureError(path, f"cannot be read ({reason})", f"give an intact picture as {what}") from None
 
 
-def _read_rgba(path: Path) -> ByteArray:
+def read_rgba(path: Path) -> ByteArray:
+    """(H, W, 4) uint8 of a picture of any mode, upright. Raises FigureError."""
     image = _open(path, "figure")
     if image.mode.startswith(("I", "F")):
         # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
@@ -132,14 +133,15 @@ def _read_rgba(path: Path) -> ByteArray:
     return rgba
 
 
-def _read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:
+def read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:
+    """(H, W) bool silhouette from a file, or from the figure's alpha where there is none. Raises FigureError."""
     height, width = rgba.shape[:2]
     if path is None:
         if (rgba[..., 3] >= 128).all():
             found = "no silhouette: the picture has no transparent background"
             raise FigureError(figure, found, "pass --mask PNG, or a picture with an alpha channel")
         return rgba[..., 3] >= 128
-    values = _read_rgba(path)
+    values = read_rgba(path)
     if values.shape[:2] != (height, width):
         found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
         raise FigureError(path, found, "pass a mask of the figure's size")
@@ -150,7 +152,8 @@ def _read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:
     return np.asarray(grey >= (128 if grey.max() > 1 else 1))
 
 
-def _read_labels(path: Path, rgba: ByteArray) -> ByteArray:
+def read_labels(path: Path, rgba: ByteArray) -> ByteArray:
+    """(H, W) uint8 part labels from a file. Raises FigureError."""
     image = _open(path, "part labels")
     if image.mode not in ("L", "P"):
         raise FigureError(path, f"mode {image.mode}", "give an 8-bit single-channel or palette picture of labels")

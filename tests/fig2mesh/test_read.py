@@ -160,5 +160,5 @@ def test_depth_order_comes_from_the_joints_file(files: DrawnFiles, tmp_path: Pat
     path.write_text(json.dumps(content))
     assert read_figure(files.image, keypoints=path).depth_order == {"l_arm": "behind"}
     path.write_text(json.dumps(content | {"depth_order": {"l_arm": "above"}}))
-    with pytest.raises(FigureError, match="depth_order is .* give"):
+    with pytest.raises(FigureError, match=r"depth_order is .* give"):
         read_figure(files.image, keypoints=path)
