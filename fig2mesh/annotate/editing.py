@@ -14,7 +14,7 @@ from fig2mesh.errors import FigureError, InputError
 from fig2mesh.parse.annotation import COLOURS, Annotation
 from fig2mesh.parse.joint_writers import SKELETON
 from fig2mesh.parse.keypoints import read_keypoints
-from fig2mesh.parse.read import read_labels, read_mask, read_rgba
+from fig2mesh.parse.read import read_labels, read_mask, read_view
 from fig2mesh.records import JOINT_NAMES, LIMBS, PART_NAMES, BoolArray, ByteArray, FloatArray
 
 INSIDE = 128
@@ -58,25 +58,20 @@ def begin(
     What no file says is a first guess: the silhouette from the alpha channel, a standing person for joints.
     Raises FigureError as `fig2mesh.parse.read.read_figure` does.
     """
-    rgba = read_rgba(path)
-    height, width = rgba.shape[:2]
-    transparent = bool((rgba[..., 3] < 128).any())
-    silhouette = read_mask(mask, rgba, path) if mask is not None or transparent else np.zeros((height, width), bool)
-    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, rgba)
-    x0, y0, x1, y1 = bbox or (0, 0, width, height)
-    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
-        raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
-    if (x1 - x0) * (y1 - y0) > MOST_PIXELS:
-        raise FigureError(path, f"{x1 - x0}×{y1 - y0} px is too much for a page", "pass --bbox round the figure")
-    window = np.s_[y0:y1, x0:x1]
-    subject = Subject(path.stem, path.name, rgba[window], (x0, y0), (width, height))
-    silhouette = silhouette[window]
+    view = read_view(path, bbox)
+    height, width = view.rgba.shape[:2]
+    if height * width > MOST_PIXELS:
+        raise FigureError(path, f"{width}×{height} px is too much for a page", "pass --bbox round the figure")
+    transparent = bool((view.rgba[..., 3] < 128).any())
+    silhouette = read_mask(mask, view, path) if mask is not None or transparent else np.zeros((height, width), bool)
+    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, view)
+    subject = Subject(path.stem, path.name, view.rgba, view.corner, view.size)
     if keypoints is None:
         joints, visible = standing(silhouette), np.ones(len(JOINT_NAMES), np.bool_)
-        return subject, Annotation(silhouette, joints, visible, labels[window])
+        return subject, Annotation(silhouette, joints, visible, labels)
     given = read_keypoints(keypoints, path.name, bbox)
-    joints = given.points_px - np.array([x0, y0], np.float32)
-    return subject, Annotation(silhouette, joints, given.visible, labels[window], given.depth_order)
+    joints = given.points_px - np.array(view.corner, np.float32)
+    return subject, Annotation(silhouette, joints, given.visible, labels, given.depth_order)
 
 
 def standing(mask: BoolArray) -> FloatArray:

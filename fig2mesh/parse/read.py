@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.keypoints import read_keypoints
+from fig2mesh.parse.window import is_large, read_window, size_of
 from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray, Figure
 
 MAX_PIXELS = 178_956_970
@@ -20,6 +22,43 @@ BAND_PX = 512
 
 JOINT_SLACK_PX = 1.0
 """Joints may lie on the picture's edge; rounding by annotation tools puts them up to a pixel outside."""
+
+
+@dataclass(frozen=True)
+class View:
+    """The part of a picture that holds the figure.
+
+    rgba : (H, W, 4) uint8; corner : (x, y) of its corner in the picture; size : (width, height) of the whole picture
+    """
+
+    rgba: ByteArray
+    corner: tuple[int, int]
+    size: tuple[int, int]
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Its rows and columns in the whole picture."""
+        (x, y), (height, width) = self.corner, self.rgba.shape[:2]
+        return slice(y, y + height), slice(x, x + width)
+
+
+def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> View:
+    """The picture, or the part of it inside of `bbox`; of large ones no more than that is kept in memory.
+
+    Raises FigureError as `read_figure` does.
+    """
+    if bbox is None:
+        rgba = read_rgba(path)
+        return View(rgba, (0, 0), (rgba.shape[1], rgba.shape[0]))
+    if is_large(path):
+        pixels, size = read_window(path, bbox)
+        return View(pixels, bbox[:2], size)
+    rgba = read_rgba(path)
+    height, width = rgba.shape[:2]
+    x0, y0, x1, y1 = bbox
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
+    return View(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
 
 
 def read_figure(
@@ -36,9 +75,9 @@ def read_figure(
     Parameters
     ----------
     path : the picture; its alpha channel is the silhouette unless `mask` is given
-    mask : picture of the same size, figure bright (≥ 128) on dark, or its alpha channel
+    mask : picture of the same size, or of the size of `bbox`; figure bright (≥ 128) on dark, or its alpha channel
     keypoints : joints, see `read_keypoints`
-    part_labels : 8-bit single-channel picture of the same size with the labels of `PART_NAMES`
+    part_labels : 8-bit single-channel picture of a size as for `mask` with the labels of `PART_NAMES`
     bbox : x0, y0, x1, y1 in IMAGE pixels, x1 and y1 exclusive; everything outside is cut off
     name : identifier of the figure; default: the file's stem
 
@@ -46,28 +85,21 @@ def read_figure(
     ------
     FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture
     """
-    rgba = read_rgba(path)
-    height, width = rgba.shape[:2]
-    silhouette = read_mask(mask, rgba, path)
+    view = read_view(path, bbox)
+    rgba, (width, height) = view.rgba, view.size
+    silhouette = read_mask(mask, view, path)
     if keypoints is None:
         raise FigureError(path, "no joints given", "pass --keypoints JSON with the 21 joints")
     given = read_keypoints(keypoints, path.name, bbox)
-    joints = given.points_px
     if given.size is not None and given.size != (width, height):
         raise FigureError(
             keypoints,
             f"made for a picture of {given.size[0]}×{given.size[1]} px, but {path.name} has {width}×{height}",
             "pass the joints that belong to this picture",
         )
-    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, rgba)
-    if bbox is not None:
-        x0, y0, x1, y1 = bbox
-        if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
-            raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
-        window = np.s_[y0:y1, x0:x1]
-        rgba, silhouette, labels = rgba[window], silhouette[window], labels[window]
-        joints = joints - np.array([x0, y0], np.float32)
-        height, width = rgba.shape[:2]
+    joints = given.points_px - np.array(view.corner, np.float32)
+    labels = np.zeros(rgba.shape[:2], np.uint8) if part_labels is None else read_labels(part_labels, view)
+    height, width = rgba.shape[:2]
     if not silhouette.any():
         where = mask if mask is not None else path
         raise FigureError(where, "the silhouette is empty", "the figure must be opaque, or bright in --mask")
@@ -98,14 +130,16 @@ def _open(path: Path, what: str) -> Image.Image:
             image = Image.open(path)
             if image.width * image.height > MAX_PIXELS:
                 found = f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx"
-                raise FigureError(path, found, "cut the figure out of the sheet first")
+                raise FigureError(path, found, "pass --bbox X0 Y0 X1 Y1 round the figure")
             image.load()
             ImageOps.exif_transpose(image, in_place=True)
             return image
     except FigureError:
         raise
     except Image.DecompressionBombError:
-        raise FigureError(path, f"more than {MAX_PIXELS / 1e6:.0f} Mpx", "cut the figure out first") from None
+        raise FigureError(
+            path, f"more than {MAX_PIXELS / 1e6:.0f} Mpx", "pass --bbox X0 Y0 X1 Y1 round the figure"
+        ) from None
     except UnidentifiedImageError:
         raise FigureError(path, "not a picture that can be read", f"give a PNG, JPEG, TIFF or WebP as {what}") from None
     except FileNotFoundError:
@@ -133,18 +167,20 @@ def read_rgba(path: Path) -> ByteArray:
     return rgba
 
 
-def read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:
+def read_mask(path: Path | None, view: View, figure: Path) -> BoolArray:
     """(H, W) bool silhouette from a file, or from the figure's alpha where there is none. Raises FigureError."""
-    height, width = rgba.shape[:2]
     if path is None:
-        if (rgba[..., 3] >= 128).all():
+        if (view.rgba[..., 3] >= 128).all():
             found = "no silhouette: the picture has no transparent background"
             raise FigureError(figure, found, "pass --mask PNG, or a picture with an alpha channel")
-        return rgba[..., 3] >= 128
-    values = read_rgba(path)
-    if values.shape[:2] != (height, width):
-        found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
-        raise FigureError(path, found, "pass a mask of the figure's size")
+        return view.rgba[..., 3] >= 128
+    values = _of_view(path, view)
+    if values is None:
+        values = read_rgba(path)
+        if values.shape != view.rgba.shape:
+            width, height = view.size
+            found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
+            raise FigureError(path, found, "pass a mask of the figure's size")
     if (values[..., 3] < 255).any():
         return values[..., 3] >= 128
     grey = values[..., :3].max(axis=2)
@@ -152,14 +188,26 @@ def read_mask(path: Path | None, rgba: ByteArray, figure: Path) -> BoolArray:
     return np.asarray(grey >= (128 if grey.max() > 1 else 1))
 
 
-def read_labels(path: Path, rgba: ByteArray) -> ByteArray:
+def _of_view(path: Path, view: View) -> ByteArray | None:
+    """The view's part of a picture beside the figure's; None where that picture is not as large as the figure's."""
+    if is_large(path):
+        (x, y), (height, width) = view.corner, view.rgba.shape[:2]
+        whole = size_of(path) == view.size
+        return read_window(path, (x, y, x + width, y + height))[0] if whole else None
+    values = read_rgba(path)
+    return values[view.window] if values.shape[:2] == view.size[::-1] else None
+
+
+def read_labels(path: Path, view: View) -> ByteArray:
     """(H, W) uint8 part labels from a file. Raises FigureError."""
     image = _open(path, "part labels")
     if image.mode not in ("L", "P"):
         raise FigureError(path, f"mode {image.mode}", "give an 8-bit single-channel or palette picture of labels")
     labels = np.asarray(image, np.uint8)
-    if labels.shape != rgba.shape[:2]:
-        found = f"{labels.shape[1]}×{labels.shape[0]} px, but the figure has {rgba.shape[1]}×{rgba.shape[0]}"
+    if labels.shape == view.size[::-1]:
+        labels = labels[view.window]
+    if labels.shape != view.rgba.shape[:2]:
+        found = f"{labels.shape[1]}×{labels.shape[0]} px, but the figure has {view.size[0]}×{view.size[1]}"
         raise FigureError(path, found, "pass part labels of the figure's size")
     if labels.max() >= len(PART_NAMES):
         raise FigureError(path, f"label {labels.max()}", f"use 0 to {len(PART_NAMES) - 1}")

@@ -120,4 +120,4 @@ def test_more_pixels_than_memory_is_for(job: Job) -> None:
     Image.new("1", (16_000, 16_000)).save(picture, compress_level=1)
     keypoints = job.folder / "joints.json"
     keypoints.write_text(json.dumps({"keypoints": {name: [10, 10, 1] for name in JOINTS}}))
-    refused(job.run(picture, keypoints), "Mpx", "cut the figure out")
+    refused(job.run(picture, keypoints), "Mpx", "pass --bbox")

@@ -1,0 +1,92 @@
+"""A part of a picture, without decoding the rest into memory: scans of maps have hundreds of megapixels.
+
+libvips streams rows past the window (JPEG, PNG, WebP) or reads the tiles that it touches (tiled TIFF).
+https://www.libvips.org/API/current/how-it-opens-files.html
+"""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from fig2mesh.errors import FigureError
+from fig2mesh.records import ByteArray
+
+LARGE_PX = 16_000_000
+"""Smaller pictures are read whole, which keeps one road for almost all."""
+
+ORIENTATION = 0x0112
+"""Exif tag: 1 is upright."""
+
+
+def is_large(path: Path) -> bool:
+    """Whether a picture is worth reading in part; False too where its head cannot be read, or it must be turned."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(path)
+        with image:
+            return image.width * image.height > LARGE_PX and image.getexif().get(ORIENTATION, 1) == 1
+    except Image.DecompressionBombError:
+        return True
+    except Exception:  # whatever a damaged head raises; reading it whole says what is wrong
+        return False
+
+
+def read_window(path: Path, bbox: tuple[int, int, int, int]) -> tuple[ByteArray, tuple[int, int]]:
+    """The pixels of a window, and the size of the whole picture.
+
+    bbox : x0, y0, x1, y1 in IMAGE pixels, x1 and y1 exclusive
+    returns : (y1 - y0, x1 - x0, 4) uint8, straight alpha, sRGB; (width, height)
+
+    Memory is that of the window and some rows. Raises FigureError for a window that is not inside, and for files that
+    cannot be read.
+    """
+    import pyvips
+
+    # What libvips has to say of a file is in its errors as well.
+    logging.getLogger("pyvips").setLevel(logging.ERROR)
+    x0, y0, x1, y1 = bbox
+    try:
+        head = pyvips.Image.new_from_file(str(path), access="sequential", fail_on="truncated")
+        size = (int(head.width), int(head.height))
+        if not (0 <= x0 < x1 <= size[0] and 0 <= y0 < y1 <= size[1]):
+            found = f"{x0} {y0} {x1} {y1} is not inside {size[0]}×{size[1]} px"
+            raise FigureError("--bbox", found, "give X0 Y0 X1 Y1")
+        # Tiles may be had in any order; of all else only the rows down to the window are decoded, once.
+        image = pyvips.Image.new_from_file(str(path), access="random", fail_on="truncated") if _tiled(head) else head
+        window = image.crop(x0, y0, x1 - x0, y1 - y0)
+        if window.interpretation not in ("srgb", "rgb"):
+            window = window.colourspace("srgb")
+        if window.format == "ushort":
+            window = window / 257.0
+        if window.bands == 3:
+            window = window.addalpha()
+        pixels = np.asarray(window.cast("uchar").numpy())
+    except pyvips.Error as error:
+        reason = str(error).strip().split("\n")[0][:100]
+        raise FigureError(path, f"cannot be read ({reason})", "give an intact PNG, JPEG, TIFF or WebP") from None
+    if pixels.ndim != 3 or pixels.shape[2] != 4:
+        raise FigureError(path, f"{head.bands} bands of colour", "give a grey or RGB picture")
+    return pixels, size
+
+
+def size_of(path: Path) -> tuple[int, int]:
+    """(width, height) of a picture of any size; decodes nothing. Raises FigureError."""
+    import pyvips
+
+    try:
+        head = pyvips.Image.new_from_file(str(path), access="sequential")
+    except pyvips.Error:
+        raise FigureError(path, "not a picture that can be read", "give a PNG, JPEG, TIFF or WebP") from None
+    return int(head.width), int(head.height)
+
+
+def _tiled(image: object) -> bool:
+    """Whether a file is made of tiles: known of TIFF alone."""
+    loader = image.get("vips-loader")  # type: ignore[attr-defined]
+    return bool(str(loader).startswith("tiff") and image.get_typeof("tile-width"))  # type: ignore[attr-defined]
