@@ -25,11 +25,17 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 Look = Callable[..., dict[str, Any]]
 
 
-def browser() -> Look:
-    """A function that opens an address in headless Chromium and acts there, see tests/clients/view.mjs."""
+def chromium() -> str:
+    """The program."""
     program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     if program is None:
         pytest.skip(f"no browser ({', '.join(BROWSERS)}): pages not looked at; apt-get install chromium")
+    return program
+
+
+def browser() -> Look:
+    """A function that opens an address in headless Chromium and acts there, see tests/clients/view.mjs."""
+    program = chromium()
     run = runner(installed(ROOT / "build" / "browser", "playwright-core"))
 
     def act(url: str, *actions: dict[str, Any], size: tuple[int, int] = (256, 256)) -> dict[str, Any]:

@@ -1,0 +1,1 @@
+"""Correcting by hand what was found in a drawing: joints, silhouette, parts, which limbs are in front."""

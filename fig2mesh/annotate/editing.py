@@ -1,0 +1,146 @@
+"""What the page and the program send each other: a JSON head, and a byte for each pixel."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fig2mesh.errors import FigureError, InputError
+from fig2mesh.parse.annotation import COLOURS, Annotation
+from fig2mesh.parse.joint_writers import SKELETON
+from fig2mesh.parse.keypoints import read_keypoints
+from fig2mesh.parse.read import read_labels, read_mask, read_view
+from fig2mesh.records import JOINT_NAMES, LIMBS, PART_NAMES, BoolArray, ByteArray, FloatArray
+
+INSIDE = 128
+"""This bit of a pixel's byte says that it is in the silhouette; the lower ones are its part label."""
+
+MOST_PIXELS = 40_000_000
+"""Browsers do not draw on larger canvases."""
+
+STANDING = {
+    "head": (0.0, 0.07), "eyes": (0.0, 0.065), "neck": (0.0, 0.15), "thorax": (0.0, 0.21), "pelvis": (0.0, 0.5),
+    "shoulder": (0.11, 0.19), "elbow": (0.16, 0.34), "wrist": (0.18, 0.48), "hand": (0.185, 0.52),
+    "hip": (0.06, 0.52), "knee": (0.065, 0.73), "ankle": (0.07, 0.95), "foot": (0.085, 0.985),
+}  # fmt: skip
+"""A standing person seen from the front: (right as seen of the middle for its left side, down), in heights."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A drawing that is being annotated.
+
+    rgba : (H, W, 4) of the part of the picture that is shown; corner : (x, y) of its corner in the picture
+    size : (width, height) of the whole picture; picture : its file name
+    """
+
+    name: str
+    picture: str
+    rgba: ByteArray
+    corner: tuple[int, int]
+    size: tuple[int, int]
+
+
+def begin(
+    path: Path,
+    mask: Path | None,
+    keypoints: Path | None,
+    part_labels: Path | None,
+    bbox: tuple[int, int, int, int] | None,
+) -> tuple[Subject, Annotation]:
+    """A drawing and what is known of it, in IMAGE pixels of the part that is shown.
+
+    What no file says is a first guess: the silhouette from the alpha channel, a standing person for joints.
+    Raises FigureError as `fig2mesh.parse.read.read_figure` does.
+    """
+    view = read_view(path, bbox)
+    height, width = view.rgba.shape[:2]
+    if height * width > MOST_PIXELS:
+        raise FigureError(path, f"{width}×{height} px is too much for a page", "pass --bbox round the figure")
+    transparent = bool((view.rgba[..., 3] < 128).any())
+    silhouette = read_mask(mask, view, path) if mask is not None or transparent else np.zeros((height, width), bool)
+    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, view)
+    subject = Subject(path.stem, path.name, view.rgba, view.corner, view.size)
+    if keypoints is None:
+        joints, visible = standing(silhouette), np.ones(len(JOINT_NAMES), np.bool_)
+        return subject, Annotation(silhouette, joints, visible, labels)
+    given = read_keypoints(keypoints, path.name, bbox)
+    joints = given.points_px - np.array(view.corner, np.float32)
+    return subject, Annotation(silhouette, joints, given.visible, labels, given.depth_order)
+
+
+def standing(mask: BoolArray) -> FloatArray:
+    """(21, 2) joints of a person that stands as high as the silhouette, or as the picture where there is none."""
+    rows, columns = np.nonzero(mask) if mask.any() else np.nonzero(np.ones_like(mask))
+    top, height, middle = rows.min(), np.ptp(rows) + 1, (columns.min() + columns.max() + 1) / 2
+    joints = []
+    for name in JOINT_NAMES:
+        x, y = STANDING[name.split("_")[-1]]
+        # The figure looks at the viewer: its left is on the right.
+        joints.append((middle + (-x if name.startswith("r_") else x) * height, top + y * height))
+    limit = np.array([mask.shape[1], mask.shape[0]], np.float32)
+    return np.clip(np.array(joints, np.float32), 0, limit)
+
+
+def on_whole_picture(subject: Subject, annotation: Annotation) -> Annotation:
+    """The annotation in pixels of the whole picture."""
+    (x, y), (width, height) = subject.corner, subject.size
+    rows, columns = annotation.mask.shape
+    mask, labels = np.zeros((height, width), np.bool_), np.zeros((height, width), np.uint8)
+    window = np.s_[y : y + rows, x : x + columns]
+    mask[window], labels[window] = annotation.mask, annotation.part_labels
+    joints = annotation.joints_px + np.array([x, y], np.float32)
+    return Annotation(mask, joints, annotation.visible, labels, annotation.depth_order)
+
+
+def packed(subject: Subject, annotation: Annotation) -> bytes:
+    """What the page starts with: head and pixels, see `unpacked`, and in the head what it must know besides."""
+    height, width = annotation.mask.shape
+    rows = zip(JOINT_NAMES, annotation.joints_px.astype(float).tolist(), annotation.visible.tolist(), strict=True)
+    head = {
+        "name": subject.name, "width": width, "height": height,
+        "joints": {name: [*point, int(seen)] for name, point, seen in rows},
+        "depth_order": dict(annotation.depth_order),
+        "parts": PART_NAMES, "colours": COLOURS, "bones": SKELETON, "limbs": LIMBS,
+    }  # fmt: skip
+    pixels = np.where(annotation.mask, annotation.part_labels | INSIDE, 0).astype(np.uint8)
+    text = json.dumps(head).encode()
+    return struct.pack("<I", len(text)) + text + pixels.tobytes()
+
+
+def unpacked(message: bytes, subject: Subject) -> Annotation:
+    """The annotation that a page sends: 4 bytes with the length of the head, little-endian, the head in JSON, and a
+    byte for each pixel, row by row: `INSIDE` and the part label.
+
+    Raises InputError for a message of another kind; never trusts what it holds.
+    """
+    height, width = subject.rgba.shape[:2]
+    try:
+        (length,) = struct.unpack_from("<I", message)
+        head: dict[str, Any] = json.loads(message[4 : 4 + length])
+        pixels = np.frombuffer(message, np.uint8, height * width, 4 + length).reshape(height, width)
+        if len(message) != 4 + length + height * width:
+            raise ValueError("wrong length")
+        values = np.array([head["joints"][name] for name in JOINT_NAMES], np.float64)
+        if values.shape != (len(JOINT_NAMES), 3) or not np.isfinite(values).all():
+            raise ValueError("joints")
+        order = head["depth_order"]
+        mask, labels = pixels >= INSIDE, pixels & (INSIDE - 1)
+        if labels.max() >= len(PART_NAMES):
+            raise ValueError("label")
+        annotation = Annotation(
+            mask,
+            np.clip(values[:, :2], 0, [width, height]).astype(np.float32),
+            values[:, 2] > 0,
+            np.where(mask, labels, 0).astype(np.uint8),
+            order,
+        )
+        annotation.figure(subject.name, subject.rgba)  # checks shapes and limbs
+        return annotation
+    except (struct.error, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError("the page", f"sent what is no annotation ({type(error).__name__})", "load it again") from None

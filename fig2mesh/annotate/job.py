@@ -1,0 +1,86 @@
+"""`fig2mesh annotate`: read a drawing, show the page, save what is done there. All side effects are here."""
+
+from __future__ import annotations
+
+import html
+import logging
+import shlex
+from pathlib import Path
+from typing import Any
+
+from fig2mesh.annotate.editing import Subject, begin, on_whole_picture
+from fig2mesh.annotate.server import annotation_server
+from fig2mesh.errors import FigureError, OutputError
+from fig2mesh.job import configure_logging
+from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, write_annotation
+from fig2mesh.settings import settings_for
+from fig2mesh.view.job import scene_of
+from fig2mesh.view.page import view_page
+from fig2mesh.view.server import show
+from fig2mesh.view.template import asset, filled
+
+log = logging.getLogger("fig2mesh")
+
+PACKAGE = "fig2mesh.annotate"
+
+
+def run(
+    *,
+    figure: Path,
+    output: Path | None,
+    mask: Path | None,
+    keypoints: Path | None,
+    part_labels: Path | None,
+    bbox: tuple[int, int, int, int] | None,
+    parts: str,
+    port: int,
+    open_: bool,
+    quiet: bool,
+    verbose: int,
+) -> None:
+    """What `fig2mesh annotate FIGURE …` does; the parameters are the options of the command line."""
+    configure_logging(quiet, verbose)
+    folder = output if output is not None else Path(f"{figure.stem}_annotation")
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(folder, "is a file", "name a folder")
+
+    def kept(given: Path | None, name: str) -> Path | None:
+        # What was saved before goes on, unless an option names another file.
+        return given if given is not None else folder / name if (folder / name).is_file() else None
+
+    subject, start = begin(figure, kept(mask, MASK), kept(keypoints, KEYPOINTS), kept(part_labels, PART_LABELS), bbox)
+
+    def save(annotation: Annotation) -> str:
+        write_annotation(folder, on_whole_picture(subject, annotation), subject.picture, overwrite=True)
+        log.info("%s", main_job(figure, folder, bbox))
+        return f"saved in {folder}"
+
+    def preview(annotation: Annotation) -> str:
+        return preview_page(subject, annotation, parts)
+
+    show(annotation_server(page(subject), subject, start, save, preview, port), open_)
+
+
+def page(subject: Subject) -> str:
+    """The page of a drawing; picture and annotation it asks the server for."""
+    scripts = "\n".join(asset(f"{name}.js", PACKAGE) for name in ("document", "canvas", "page"))
+    values = {"title": html.escape(subject.name), "style": asset("page.css", PACKAGE), "scripts": scripts}
+    return filled("page.html", values, PACKAGE)
+
+
+def preview_page(subject: Subject, annotation: Annotation, parts: str) -> str:
+    """The page that shows the solid, of draft quality. Raises FigureError where there is none."""
+    if not annotation.mask.any():
+        raise FigureError(subject.picture, "the silhouette is empty", "paint it first")
+    settings: Any = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
+    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, 1.79))
+
+
+def main_job(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:
+    """The command that makes a model of what was saved."""
+    words = ["fig2mesh", str(figure)]
+    for option, name in (("--keypoints", KEYPOINTS), ("--mask", MASK), ("--part-labels", PART_LABELS)):
+        words += [option, str(folder / name)]
+    if bbox is not None:
+        words += ["--bbox", *map(str, bbox)]
+    return shlex.join(words)

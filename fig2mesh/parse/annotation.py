@@ -1,0 +1,72 @@
+"""What is known of a drawing besides its pixels, and its files: keypoints.json, mask.png, part_labels.png."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, PngImagePlugin
+
+from exporters.write import write_whole
+from fig2mesh.parse.joint_writers import WRITERS
+from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, DepthOrder, Figure, FloatArray
+
+KEYPOINTS, MASK, PART_LABELS = "keypoints.json", "mask.png", "part_labels.png"
+"""Names of the files in a folder of annotations; the main job's options of the same names read them."""
+
+COLOURS = (
+    (0, 0, 0), (230, 159, 0), (240, 228, 66), (86, 180, 233), (0, 114, 178), (120, 200, 240), (60, 90, 200),
+    (170, 220, 255), (110, 130, 230), (0, 158, 115), (204, 121, 167), (110, 200, 120), (230, 150, 190), (170, 230, 150),
+    (250, 190, 215), (120, 80, 40), (213, 94, 0), (150, 150, 150),
+)  # fmt: skip
+"""Colour of each label of `PART_NAMES` in pictures and pages: left limbs blue and green, right ones violet and pink."""
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """What is known of a drawing; all in IMAGE pixels of the whole picture.
+
+    mask : (H, W) bool; joints_px : (21, 2) float32; visible : (21,) bool; part_labels : (H, W) uint8, 0 outside of
+    the mask; depth_order : as in `Figure`
+    """
+
+    mask: BoolArray
+    joints_px: FloatArray
+    visible: BoolArray
+    part_labels: ByteArray
+    depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
+
+    def figure(self, name: str, rgba: ByteArray) -> Figure:
+        """The figure that picture and annotation make."""
+        return Figure(name, rgba, self.mask, self.joints_px, self.visible, self.part_labels, self.depth_order)
+
+
+def write_annotation(
+    folder: Path, annotation: Annotation, picture: str, kind: str = "fig2mesh", overwrite: bool = False
+) -> tuple[Path, ...]:
+    """Write the three files of an annotation, all or none.
+
+    folder : made if it is not there; picture : file name of the drawing; kind : of the joints file, see `WRITERS`
+    returns : the files written
+
+    part_labels.png has a palette, so that it can be looked at, and says in the text chunk "legend" what its numbers
+    mean. Raises ExportError where the disk refuses or a file is there already.
+    """
+    height, width = annotation.mask.shape
+    joints = WRITERS[kind](annotation.joints_px, annotation.visible, (width, height), picture)
+    if annotation.depth_order and kind == "fig2mesh":
+        joints["depth_order"] = dict(annotation.depth_order)
+
+    def fill(stage: Path) -> None:
+        (stage / KEYPOINTS).write_text(json.dumps(joints, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        Image.fromarray(np.where(annotation.mask, np.uint8(255), np.uint8(0))).save(stage / MASK)
+        labels = Image.fromarray(np.where(annotation.mask, annotation.part_labels, np.uint8(0)))
+        labels.putpalette([value for colour in COLOURS for value in colour])
+        text = PngImagePlugin.PngInfo()
+        text.add_text("legend", json.dumps(dict(enumerate(PART_NAMES))))
+        labels.save(stage / PART_LABELS, pnginfo=text, optimize=False)
+
+    return write_whole(folder, folder / KEYPOINTS, fill, overwrite)
