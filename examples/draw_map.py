@@ -2,9 +2,10 @@
 
     python -m examples.draw_map [OUT]
 
-writes to OUT, by default back into `maps/lake_zurich/`: map.jpg; map.jgw, the world file that places it (WGS 84
-longitude and latitude, linear in the pixels); figures.csv, one row a figure: its picture, where its feet are on the
-sheet (pixels, as in IMAGE: middles of pixels at +0.5), its height in metres at the sheet's scale, and its box.
+writes to OUT, by default back into `maps/lake_zurich/`: map.jpg; map.jgw, the world file that places it, and map.prj,
+which says in what (WGS 84 longitude and latitude, linear in the pixels); figures.csv, one row a figure: its picture,
+where its feet are on the sheet (pixels, as in IMAGE: middles of pixels at +0.5), its height in metres at the sheet's
+scale, and its box.
 
 Shores, streams and towns are where they are to about 300 m, drawn by hand for this map; nothing is copied from others.
 """
@@ -24,6 +25,7 @@ from typing import Any
 
 import matplotlib
 import numpy as np
+import pyproj
 import resvg_py
 from PIL import Image
 
@@ -261,7 +263,7 @@ def svg(rows: Sequence[dict[str, str | float]]) -> str:
 
 
 def run(out_dir: str | Path = MAPS / "lake_zurich") -> list[Path]:
-    """Write map.jpg, map.jgw and figures.csv into `out_dir` and return them."""
+    """Write map.jpg, map.jgw, map.prj and figures.csv into `out_dir` and return them."""
     out_dir = Path(out_dir)
     out_dir.mkdir(parents=True, exist_ok=True)
     rows = people()
@@ -275,16 +277,17 @@ def run(out_dir: str | Path = MAPS / "lake_zurich") -> list[Path]:
     y, x = np.mgrid[-1 : 1 : HEIGHT * 1j, -1 : 1 : WIDTH * 1j].astype(np.float32)
     rim = 1 - 0.10 * np.maximum(abs(x), abs(y)) ** 8
     picture = np.clip((paper + 2.2 * grain[..., None]) * rim[..., None], 0, 255).astype(np.uint8)
-    sheet, world, table = out_dir / "map.jpg", out_dir / "map.jgw", out_dir / "figures.csv"
+    sheet, world, reference, table = (out_dir / name for name in ("map.jpg", "map.jgw", "map.prj", "figures.csv"))
     Image.fromarray(picture).save(sheet, quality=82, optimize=True)
     dx, dy = (EAST - WEST) / WIDTH, (NORTH - SOUTH) / HEIGHT
     # Its last two numbers are the middle of the first pixel.
     world.write_text("".join(f"{value:.12f}\n" for value in (dx, 0, 0, -dy, WEST + dx / 2, NORTH - dy / 2)))
+    reference.write_text(pyproj.CRS.from_epsg(4326).to_wkt("WKT1_ESRI") + "\n")
     with table.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(rows)
-    return [sheet, world, table]
+    return [sheet, world, reference, table]
 
 
 if __name__ == "__main__":

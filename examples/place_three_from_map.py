@@ -2,8 +2,8 @@
 
 python examples/place_three_from_map.py [OUT]
 
-The map's world file turns pixels into longitude and latitude; figures.csv says where the feet are. To see them stand
-on it: fig2mesh globe OUT/*.glb --overlay examples/maps/lake_zurich/map.jpg 8.38 47.16 8.92 47.44
+The map's world file says where its pixels are; figures.csv says where on it the feet are. One tileset holds all three.
+To see them stand on it: fig2mesh globe OUT/tiles --overlay examples/maps/lake_zurich/map.jpg 8.38 47.16 8.92 47.44
 """
 
 from __future__ import annotations
@@ -18,34 +18,31 @@ MAP = Path(__file__).resolve().parent / "maps" / "lake_zurich"
 
 
 def run(out_dir: Path, quality: str = "standard", suffixes: tuple[str, ...] = (".glb", ".usdc")) -> list[Path]:
-    """Convert the figures on the map and return the files made, one a figure and suffix."""
+    """Convert the figures on the map; return the files made, one a figure and suffix, and the tileset of all."""
     out_dir = Path(out_dir)
     out_dir.mkdir(parents=True, exist_ok=True)
-    dx, _, _, dy, lon, lat = map(float, (MAP / "map.jgw").read_text().split())
     outputs = []
     with (MAP / "figures.csv").open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):
             image = MAP / row["figure"]
-            name = row["name"].replace(" ", "_")
-            # The world file speaks of the middle of the first pixel, which is at +0.5.
-            place = [lon + dx * (float(row["x"]) - 0.5), lat + dy * (float(row["y"]) - 0.5)]
-            arguments = [str(image), "--keypoints", str(image.with_name("keypoints.json"))]
-            arguments += ["--lonlat", *(f"{degrees:.9f}" for degrees in place), "--height-m", row["height-m"]]
-            arguments += [
-                "--facing",
-                "viewer",
-                "--quality",
-                quality,
-                "--credit",
-                "fig2mesh authors, MIT",
-                "--overwrite",
-            ]
-            made = [out_dir / f"{name}{suffix}" for suffix in suffixes]
-            code = main(arguments + [word for path in made for word in ("-o", str(path))])
-            if code:
-                raise SystemExit(code)
+            made = [out_dir / f"{row['name'].replace(' ', '_')}{suffix}" for suffix in suffixes]
+            _fig2mesh(
+                image, "--keypoints", image.with_name("keypoints.json"), "--name", row["name"],
+                "--map", MAP / row["map"], "--at", row["x"], row["y"], "--height-m", row["height-m"],
+                "--quality", quality, "--credit", "fig2mesh authors, MIT", "--overwrite",
+                *(word for path in made for word in ("-o", path)),
+            )  # fmt: skip
             outputs += made
-    return outputs
+    tiles = out_dir / "tiles"
+    models = [path for path in outputs if path.suffix == ".glb"]
+    _fig2mesh("tileset", *models, "-o", tiles, "--visible-from", 500_000, "--overwrite")
+    return [*outputs, tiles / "tileset.json"]
+
+
+def _fig2mesh(*words: object) -> None:
+    code = main([str(word) for word in words])
+    if code:
+        raise SystemExit(code)
 
 
 if __name__ == "__main__":

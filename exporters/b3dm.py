@@ -91,7 +91,8 @@ def _batch_table(gltf: Gltf) -> dict[str, list[Any]]:
 def _rewritten(gltf: Gltf, batched: bool) -> bytes:
     """The glTF without the extensions that carried the parts, and without the bytes that only they referred to."""
     document: dict[str, Any] = json.loads(json.dumps(gltf.document))
-    tables = document.get("extensions", {}).pop(STRUCTURAL_METADATA, {}).get("propertyTables", [])
+    metadata = document.get("extensions", {}).pop(STRUCTURAL_METADATA, {})
+    tables = metadata.get("propertyTables", [])
     dropped = {
         column[key]
         for table in tables
@@ -99,6 +100,7 @@ def _rewritten(gltf: Gltf, batched: bool) -> bytes:
         for key in ("values", "stringOffsets", "arrayOffsets")
         if key in column
     }
+    dropped |= _without_images_of(document, metadata.get("propertyTextures", []))
     if not document.get("extensions", True):
         del document["extensions"]
     used = [name for name in document.get("extensionsUsed", []) if name not in (MESH_FEATURES, STRUCTURAL_METADATA)]
@@ -106,7 +108,8 @@ def _rewritten(gltf: Gltf, batched: bool) -> bytes:
     if used:
         document["extensionsUsed"] = used
     for primitive in (each for mesh in document.get("meshes", []) for each in mesh["primitives"]):
-        primitive.get("extensions", {}).pop(MESH_FEATURES, None)
+        for name in (MESH_FEATURES, STRUCTURAL_METADATA):
+            primitive.get("extensions", {}).pop(name, None)
         if not primitive.get("extensions", True):
             del primitive["extensions"]
         if batched:
@@ -120,6 +123,29 @@ def _rewritten(gltf: Gltf, batched: bool) -> bytes:
     length = 12 + 8 + len(text) + 8 + len(binary)
     head = struct.pack("<4sII", b"glTF", 2, length) + struct.pack("<I4s", len(text), b"JSON")
     return b"".join([head, text, struct.pack("<I4s", len(binary), b"BIN\0"), binary])
+
+
+def _without_images_of(document: dict[str, Any], property_textures: list[dict[str, Any]]) -> set[int]:
+    """Take the textures of property textures away, where they are the last ones, with their images and samplers.
+
+    returns : the buffer views of those images
+    """
+    views: set[int] = set()
+    wanted = {each["index"] for holder in property_textures for each in holder.get("properties", {}).values()}
+    for index in sorted(wanted, reverse=True):
+        textures, images, samplers = (document.get(kind, []) for kind in ("textures", "images", "samplers"))
+        texture = textures[index]
+        # Others would have to be renumbered; ours come last.
+        if (index, texture.get("source"), texture.get("sampler")) != tuple(
+            len(items) - 1 for items in (textures, images, samplers)
+        ):
+            continue
+        textures.pop()
+        samplers.pop()
+        image = images.pop()
+        if "bufferView" in image:
+            views.add(image["bufferView"])
+    return views
 
 
 def _repacked(document: dict[str, Any], gltf: Gltf, dropped: set[int]) -> bytes:

@@ -88,6 +88,7 @@ def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
     for index in range(len(gltf.items("images"))):
         yield from _check_image(gltf, index, f"{name}: images/{index}")
     yield from _check_property_tables(gltf)
+    yield from _check_property_textures(gltf)
 
 
 def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
@@ -196,6 +197,22 @@ def _check_property_tables(gltf: Gltf) -> Iterator[Finding]:
             if len(offsets) != expected or (np.diff(offsets.astype(np.int64)) < 0).any() or offsets[-1] > len(values):
                 message = f"{key}: {len(offsets)} string offsets up to {offsets[-1:]}, expected {expected} rising ones"
                 yield Finding("error", "STRING_OFFSETS", message, where)
+
+
+def _check_property_textures(gltf: Gltf) -> Iterator[Finding]:
+    metadata = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {})
+    classes = metadata.get("schema", {}).get("classes", {})
+    for index, holder in enumerate(metadata.get("propertyTextures", [])):
+        where = f"{gltf.path.name}: propertyTextures/{index}"
+        known = classes.get(holder.get("class"), {}).get("properties")
+        if known is None:
+            yield Finding("error", "PROPERTY_TEXTURE", f"class {holder.get('class')} is not in the schema", where)
+            continue
+        for key, texture in holder.get("properties", {}).items():
+            if key not in known:
+                yield Finding("error", "PROPERTY_TEXTURE", f"property {key} is not in its class", where)
+            if not 0 <= texture.get("index", -1) < len(gltf.items("textures")):
+                yield Finding("error", "PROPERTY_TEXTURE", f"{key}: no texture {texture.get('index')}", where)
 
 
 def _check_manifold(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:

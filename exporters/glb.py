@@ -25,7 +25,7 @@ from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.gltf_document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
 from exporters.gltf_material import linear_rgba, material, texture_file
-from exporters.gltf_parts import features, manifold
+from exporters.gltf_parts import evidence, features, manifold
 from exporters.ktx2 import padded
 from exporters.meshopt import quantised, quantised_uv, reordered
 from exporters.part_borders import split_at_parts
@@ -100,6 +100,9 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
     if profile.extensions:
         if mesh.parts is not None:
             primitive["extensions"] = {"EXT_mesh_features": features(document, asset, mesh, attributes)}
+            shown = evidence(document, mesh)
+            if shown is not None:
+                primitive["extensions"]["EXT_structural_metadata"] = shown
         solid = manifold(document, mesh, corners, indices, attributes["POSITION"])
         if solid is not None:
             item["extensions"] = {"EXT_mesh_manifold": solid}

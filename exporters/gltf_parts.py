@@ -17,6 +17,8 @@ from exporters.gltf_document import ARRAY_BUFFER, COMPONENT_TYPES, Document
 from exporters.sampling import observed_shares
 from exporters.solid import measure_topology, solid_of
 
+NEAREST, CLAMP_TO_EDGE = 9728, 33071
+
 
 def features(
     document: Document, asset: Asset, mesh: TexturedMesh, attributes: dict[str, int]
@@ -56,6 +58,38 @@ def features(
         "schema": schema, "propertyTables": [table],
     }  # fmt: skip
     return {"featureIds": [{"featureCount": len(labels), "attribute": 0, "propertyTable": 0, "label": "part"}]}
+
+
+def evidence(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
+    """EXT_structural_metadata of a primitive whose texels say what the drawing showed: a property texture `observed`,
+    1 where it did and 0 where the surface is inferred, texel for texel of the colours.
+
+    To be called after `features`, whose schema it adds to. None where the mesh has no such mask, or no texture.
+    """
+    if mesh.parts is None or mesh.observed is None or mesh.texture is None:
+        return None
+    metadata = document.json["extensions"]["EXT_structural_metadata"]
+    description = "1 where the drawing itself shows the surface, 0 where it is inferred"
+    metadata["schema"]["classes"]["surface"] = {
+        "name": "Surface",
+        "properties": {
+            "observed": {
+                "type": "SCALAR", "componentType": "UINT8", "normalized": True, "required": True,
+                "description": description,
+            },
+        },
+    }  # fmt: skip
+    # A PNG whatever the colours are: masks are small, and every client that knows the extension reads it.
+    view = document.view("observed", mesh.observed.png)
+    image = document.add("images", {"name": "observed", "bufferView": view, "mimeType": "image/png"})
+    sampler = document.add(
+        "samplers",
+        {"magFilter": NEAREST, "minFilter": NEAREST, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE},
+    )
+    texture = document.add("textures", {"name": "observed", "sampler": sampler, "source": image})
+    observed = {"index": texture, "texCoord": 0, "channels": [0]}
+    metadata["propertyTextures"] = [{"name": "surface", "class": "surface", "properties": {"observed": observed}}]
+    return {"propertyTextures": [0]}
 
 
 def manifold(

@@ -74,8 +74,16 @@ def padded(mesh: TexturedMesh) -> TexturedMesh:
     wide, high = width + -width % 4, height + -height % 4
     if (wide, high) == (width, height):
         return mesh
-    pixels = np.pad(mesh.texture.pixels, ((0, high - height), (0, wide - width), (0, 0)), mode="edge")
-    return replace(mesh, texture=Texture(pixels), uv=mesh.uv * (width / wide, height / high))
+
+    def grown(texture: Texture) -> Texture:
+        return Texture(np.pad(texture.pixels, ((0, high - height), (0, wide - width), (0, 0)), mode="edge"))
+
+    # A mask of another size could not be padded by the same share of it.
+    same = mesh.observed is not None and mesh.observed.pixels.shape[:2] == (height, width)
+    observed = grown(mesh.observed) if mesh.observed is not None and same else None
+    return replace(
+        mesh, texture=grown(mesh.texture), observed=observed, uv=mesh.uv * (width / wide, height / high)
+    )  # fmt: skip
 
 
 def size_of(data: bytes) -> tuple[int, int]:

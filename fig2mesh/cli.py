@@ -113,6 +113,7 @@ def cli() -> None:
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
+@click.option("--name", metavar="TEXT", help="What the figure is called in the outputs; default: FIGURE's stem.")
 @click.option("--credit", default="", metavar="TEXT", help="Attribution, kept in the outputs.")
 @click.option(
     "--evidence/--no-evidence", default=True, show_default=True,

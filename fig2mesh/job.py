@@ -57,6 +57,7 @@ def run(
     closing: str,
     device: str,
     seed: int,
+    name: str | None,
     credit: str,
     evidence: bool,
     save_stages: Path | None,
@@ -84,12 +85,12 @@ def run(
         raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
     client = profile_named(profile)
     client.check_tools()
-    _check_targets(targets, figure.stem, lods, request.somewhere, overwrite, tiles_version, client)
+    _check_targets(targets, name or figure.stem, lods, request.somewhere, overwrite, tiles_version, client)
     if not 0 < visible_from < 1e9:
         raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
     if report is not None:
         check_text(report, overwrite)
-    drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
+    drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox, name=name)
     if lods > 1 and resume_from is None and not any(has_levels(target) for target in targets):
         log.info("--lods %d: only 3D Tiles and USD have levels of detail; one is made", lods)
         lods = 1

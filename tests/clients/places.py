@@ -15,7 +15,6 @@ stage is x east, y up, z south at the georeference's origin. CesiumJS converts t
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -24,16 +23,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from exporters.asset import Asset, TexturedMesh
+from exporters.czml import write_czml
 from exporters.glb import write_glb
 from exporters.tiles import write_tileset
 from exporters.usd import write_usd
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server
-from georef.geodesy import enu_at
 from georef.placement import GeoPlacement
 from tests.browser import Look, browser, cesium_js, pixels, serving
 
@@ -157,26 +155,6 @@ def _ball(centre: tuple[float, float, float], columns: int = 32, rows: int = 16)
     return BALL_M * vertices + centre, faces
 
 
-def czml(placement: GeoPlacement, model: str) -> list[dict[str, Any]]:
-    """A document with one entity: +x of an entity is the front of its model, +z its up."""
-    bearing = np.radians(placement.heading_deg)
-    front, up = np.array([np.sin(bearing), np.cos(bearing), 0.0]), np.array([0.0, 0.0, 1.0])
-    enu_from_entity = np.stack([front, np.cross(up, front), up], axis=1)
-    ecef_from_enu = enu_at(placement.lon_deg, placement.lat_deg, placement.height_m).matrix[:3, :3]
-    quaternion = Rotation.from_matrix(ecef_from_enu @ enu_from_entity).as_quat().tolist()
-    place = [placement.lon_deg, placement.lat_deg, placement.height_m]
-    return [
-        {"id": "document", "name": "marked", "version": "1.0"},
-        {
-            "id": "marked",
-            "name": "marked",
-            "position": {"cartographicDegrees": place},
-            "orientation": {"unitQuaternion": quaternion},
-            "model": {"gltf": model},
-        },
-    ]
-
-
 def measure(folder: Path, look: Look, cesium: Path) -> list[Found]:
     """All places in all formats, in one session of the browser.
 
@@ -192,7 +170,7 @@ def measure(folder: Path, look: Look, cesium: Path) -> list[Found]:
         files = [folder / f"{number}.glb", folder / f"{number}_tiles", folder / f"{number}.czml"]
         write_glb(asset, files[0])
         write_tileset(asset, files[1])
-        files[2].write_text(json.dumps(czml(place, files[0].name)))
+        write_czml(asset, files[2])
         asked = {"lon": place.lon_deg, "lat": place.lat_deg, "height": place.height_m}
         for kind in FORMATS[:3]:
             stand = STAND.format(index=len(paths), nose=list(NOSE), heading=place.heading_deg, **asked)

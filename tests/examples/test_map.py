@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
+import pyproj
 import pytest
 from PIL import Image
 
 from exporters.inspect import inspect
+from exporters.validate import validate
 
 pytest.importorskip("resvg_py")
 
@@ -20,12 +23,13 @@ FIGURES = list(csv.DictReader((MAP / "figures.csv").open(encoding="utf-8", newli
 
 
 def test_the_sheet_is_what_the_script_draws(tmp_path: Path) -> None:
-    sheet, world, table = draw_map.run(tmp_path)
+    sheet, world, reference, table = draw_map.run(tmp_path)
     stored, fresh = (np.asarray(Image.open(path)).astype(int) for path in (MAP / "map.jpg", sheet))
     assert stored.shape == fresh.shape == (draw_map.HEIGHT, draw_map.WIDTH, 3)
     # Another version of the renderer, or of what compresses it, may smooth edges a little differently.
     assert np.abs(stored - fresh).mean() < 2
     assert world.read_text() == (MAP / "map.jgw").read_text()
+    assert pyproj.CRS.from_wkt(reference.read_text()) == pyproj.CRS.from_wkt((MAP / "map.prj").read_text())
     assert table.read_text() == (MAP / "figures.csv").read_text()
     assert sum(path.stat().st_size for path in MAP.iterdir()) < 600_000
 
@@ -59,12 +63,17 @@ def test_people_are_drawn_in_their_boxes() -> None:
 @pytest.mark.slow
 def test_people_come_to_stand_where_the_map_shows_them(tmp_path: Path) -> None:
     made = run(tmp_path, quality="draft", suffixes=(".glb",))
-    assert [path.name for path in made] == ["footballer.glb", "market_woman.glb", "farmer.glb"]
-    for path, row, (_, lon, lat) in zip(made, FIGURES, draw_map.PEOPLE, strict=True):
+    *models, tileset = made
+    assert [path.name for path in models] == ["footballer.glb", "market_woman.glb", "farmer.glb"]
+    for path, row, (_, lon, lat) in zip(models, FIGURES, draw_map.PEOPLE, strict=True):
         facts = inspect(path)
         assert facts["placement"]["lon_deg"] == pytest.approx(lon, abs=2e-5)
         assert facts["placement"]["lat_deg"] == pytest.approx(lat, abs=2e-5)
-        assert facts["placement"]["heading_deg"] == 180
+        # The sheet has north at the top.
+        assert facts["placement"]["heading_deg"] == pytest.approx(180, abs=1e-6)
         low, high = facts["bounds_m"]
         assert low[1] == pytest.approx(0, abs=1)
         assert high[1] == pytest.approx(float(row["height-m"]), rel=0.02)
+    assert not [finding for finding in validate(tileset, external=False) if finding.severity != "info"]
+    index = json.loads((tileset.parent / "index.geojson").read_text())
+    assert {each["properties"]["name"] for each in index["features"]} == {row["name"] for row in FIGURES}

@@ -49,6 +49,10 @@ def test_readme_commands_run(
         draft = [] if words[0] in ("inspect", "validate", "doctor", "globe") else ["--quality", "draft", "-q"]
         # Small pictures; and a page that is written, not served until it is stopped.
         draft += {"render": ["--size", "60", "80"], "view": ["-o", "page.html"]}.get(words[0], [])
+        if words[0] == "annotate":
+            # The page is made; answering it until Ctrl-C is left out.
+            monkeypatch.setattr("fig2mesh.annotate.job.show", lambda server, open_: server.server_close())
+            draft = ["-q"]
         if words[0] == "globe":
             draft += ["-q", "-o", "globe", "--cesium", str(request.getfixturevalue("cesium"))]
         assert main([*words, *draft]) == 0, words

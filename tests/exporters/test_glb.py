@@ -21,7 +21,7 @@ from exporters.gltf_reader import read_gltf
 from exporters.part_borders import split_at_parts
 from exporters.sampling import face_parts
 from exporters.validate import validate
-from tests.exporters.analytic import ZURICH, asset, capsule
+from tests.exporters.analytic import ZURICH, asset, capsule, half_observed
 from tests.node import RunScript
 
 COLORS = np.tile(np.array([[255, 128, 0]], np.uint8), (len(capsule().vertices), 1))
@@ -132,6 +132,23 @@ def test_a_mesh_with_a_hole_does_not_claim_to_be_manifold() -> None:
     for broken in (capsule(faces=whole.faces[1:]), capsule(solid_index=np.arange(len(whole.vertices)))):
         assert b"EXT_mesh_manifold" not in glb_bytes(asset(lods=(broken,)))
     assert b"EXT_mesh_manifold" in glb_bytes(asset())
+
+
+def test_texels_say_what_the_drawing_showed(tmp_path: Path) -> None:
+    path = tmp_path / "farmer.glb"
+    write_glb(asset(ZURICH), path)
+    gltf = read_gltf(path)
+    metadata = gltf.document["extensions"]["EXT_structural_metadata"]
+    (holder,) = metadata["propertyTextures"]
+    assert holder["class"] in metadata["schema"]["classes"]
+    texture = gltf.document["textures"][holder["properties"]["observed"]["index"]]
+    with Image.open(io.BytesIO(gltf.image(texture["source"]))) as image:
+        assert np.array_equal(np.asarray(image), half_observed().pixels[..., 0])
+    primitive = gltf.document["meshes"][0]["primitives"][0]
+    assert primitive["extensions"]["EXT_structural_metadata"] == {"propertyTextures": [0]}
+    # The colours stay the first image: clients that know no metadata look no further.
+    assert primitive["material"] == 0
+    assert gltf.document["textures"][0]["source"] == 0
 
 
 def test_parts_and_how_much_of_them_was_seen(tmp_path: Path) -> None:

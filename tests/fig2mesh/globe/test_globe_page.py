@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import struct
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exporters.asset import Texture
 from exporters.glb import glb_bytes, write_glb
 from exporters.tiles import write_tileset
 from fig2mesh.globe.assets import find_assets
@@ -19,7 +17,7 @@ from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server
 from tests.browser import Look, pixels, serving
 from tests.clients.places import BARE, czml
-from tests.exporters.analytic import HEIGHT, ZURICH, asset, half_observed
+from tests.exporters.analytic import HEIGHT, ZURICH, asset
 
 EAST = replace(ZURICH, lon_deg=ZURICH.lon_deg + 4e-5, heading_deg=30.0)
 NORTH = replace(ZURICH, lat_deg=ZURICH.lat_deg + 4e-5, heading_deg=250.0)
@@ -182,39 +180,11 @@ def test_levels_are_forced_and_say_what_they_are(seen: dict[str, Any]) -> None:
     assert seen["current"] == 1
 
 
-def with_observed(glb: bytes, mask: Texture) -> bytes:
-    """The file with a property texture of what the drawing showed: 1 where it did, texel for texel of the colours.
-
-    https://github.com/CesiumGS/glTF/tree/3d-tiles-next/extensions/2.0/Vendor/EXT_structural_metadata#property-textures
-    """
-    (length,) = struct.unpack_from("<I", glb, 12)
-    document, binary = json.loads(glb[20 : 20 + length]), glb[28 + length :]
-    binary += bytes(-len(binary) % 8)
-    view = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(mask.png)}
-    document["bufferViews"].append(view)
-    binary += mask.png + bytes(-len(mask.png) % 4)
-    document["buffers"] = [{"byteLength": len(binary)}]
-    document["images"].append({"bufferView": len(document["bufferViews"]) - 1, "mimeType": "image/png"})
-    document["samplers"].append({"magFilter": 9728, "minFilter": 9728})
-    document["textures"].append({"sampler": 1, "source": 1})
-    metadata = document["extensions"]["EXT_structural_metadata"]
-    kind = {"type": "SCALAR", "componentType": "UINT8", "normalized": True, "required": True}
-    metadata["schema"]["classes"]["surface"] = {"properties": {"observed": kind}}
-    texture = {"index": 1, "texCoord": 0, "channels": [0]}
-    metadata["propertyTextures"] = [{"class": "surface", "properties": {"observed": texture}}]
-    primitive = document["meshes"][0]["primitives"][0]
-    primitive["extensions"]["EXT_structural_metadata"] = {"propertyTextures": [0]}
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
-
-
 @pytest.mark.slow
 def test_observed_or_inferred_is_shown_by_texels_where_a_file_has_them(
     tmp_path: Path, look: Look, cesium: Path
 ) -> None:
-    (tmp_path / "fine.glb").write_bytes(with_observed(glb_bytes(asset(ZURICH)), half_observed()))
+    (tmp_path / "fine.glb").write_bytes(glb_bytes(asset(ZURICH)))
     actions = [
         {"evaluate": BARE}, {"evaluate": LOOK.format(index=0)},
         {"evaluate": "fig2mesh.setMode(true)"}, {"screenshot": True},
