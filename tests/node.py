@@ -31,7 +31,9 @@ def installed(folder: Path, *names: str) -> Path:
     if not present or not all((modules / name).is_dir() for name in names):
         folder.mkdir(parents=True, exist_ok=True)
         manifest.write_text(json.dumps({"private": True, "dependencies": wanted}))
-        command = ["npm", "install", "--prefix", str(folder), "--no-audit", "--no-fund", "--no-package-lock"]
+        # No scripts of packages: none is needed, and they would compile a database for minutes.
+        options = ["--ignore-scripts", "--no-audit", "--no-fund", "--no-package-lock"]
+        command = ["npm", "install", "--prefix", str(folder), *options]
         install = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=600)
         if install.returncode:
             manifest.unlink()  # so that the next run tries again
