@@ -195,13 +195,14 @@ def head(data: Path, out: Path, budget: float | None, epochs: int | None, device
 @train.command()
 @common("Folder of crops.")
 @click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
-@click.option("--lr", type=click.FloatRange(0, min_open=True), default=1.2e-3, show_default=True, help="Learning rate.")
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=1e-3, show_default=True, help="Learning rate.")
 @click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
 @click.option("--blazepose", type=click.Path(path_type=Path, exists=True, dir_okay=False), metavar="TFLITE",
               help="Start the encoder from pose_landmark_full.tflite; docs/parsing.md says where it is from.")
+@click.option("--whole", is_flag=True, help="Train the encoder's first stages too.")
 def parse(
     data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, lr: float,
-    init: Path | None, blazepose: Path | None,
+    init: Path | None, blazepose: Path | None, whole: bool,
 ) -> None:  # fmt: skip
     """Silhouette, parts and joints from a bare picture."""
     from fig2mesh.training.train_parse import train_parse
@@ -209,7 +210,7 @@ def parse(
     _check_cpu(device)
     _say(train_parse(
         data, out, budget_min=_minutes("parse", budget, epochs), steps=None if epochs is None else 1000 * epochs,
-        seed=seed, rate=lr, init=init, blazepose=blazepose,
+        seed=seed, rate=lr, init=init, blazepose=blazepose, whole=whole,
     ))  # fmt: skip
 
 
