@@ -61,7 +61,9 @@ def drawings(folder: Path) -> list[Path]:
     found = [each for each in sorted(folder.iterdir()) if each.is_dir()
              and all((each / name).is_file() for name in ("image.png", "mask.png", "keypoints.json"))]  # fmt: skip
     if not found:
-        raise InputError(folder, "no annotated drawings", "each needs a folder with image.png, mask.png, keypoints.json")
+        raise InputError(
+            folder, "no annotated drawings", "each needs a folder with image.png, mask.png, keypoints.json"
+        )
     return found
 
 
@@ -118,7 +120,9 @@ def bare(rgba: ByteArray, ground: str) -> ByteArray:
         height, width = rgba.shape[:2]
         made = draw_background("coast", (256, 256), np.random.default_rng(3))
         side = max(height, width)
-        behind = np.asarray(Image.fromarray(np.clip(made, 0, 255).astype(np.uint8)).resize((side, side)))[:height, :width]
+        behind = np.asarray(Image.fromarray(np.clip(made, 0, 255).astype(np.uint8)).resize((side, side)))[
+            :height, :width
+        ]
     return np.rint(rgba[..., :3] * alpha + behind * (1 - alpha)).astype(np.uint8)
 
 

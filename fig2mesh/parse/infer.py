@@ -194,4 +194,3 @@ def _box(seen: Look, shape: tuple[int, int]) -> NDArray[np.float64] | None:
     bounds = np.array([*(seen.low + low * seen.edge), *(seen.low + high * seen.edge)])
     limits = np.array([shape[1], shape[0]] * 2, float)
     return np.clip(bounds, 0, limits)
-

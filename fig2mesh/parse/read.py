@@ -34,7 +34,7 @@ JOINT_SLACK_PX = 1.0
 class Reading:
     """A figure as it was read, and what was inferred for it.
 
-    figure : within its window of the picture; origin : (x, y) of the window in it; size : (width, height) of the picture
+    figure : within its window of the picture; origin : (x, y) of the window; size : (width, height) of the picture
     part_labels : (H, W) uint8 of the window, those given, or inferred where that was asked for
     confidence : (21,) 0-1 where joints were inferred, else None
     """

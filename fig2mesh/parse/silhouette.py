@@ -52,8 +52,8 @@ def refine(rgb: ByteArray, likely: FloatArray) -> BoolArray:
     found = _outline(small, guess)
     if step == 1:
         return found
-    soft = ndimage.zoom(found.astype(np.float32), (height / found.shape[0], width / found.shape[1]), order=1, grid_mode=True, mode="nearest")  # fmt: skip
-    # Along the outline, the full picture decides.
+    scale = (height / found.shape[0], width / found.shape[1])
+    soft = ndimage.zoom(found.astype(np.float32), scale, order=1, grid_mode=True, mode="nearest")
     return np.asarray(soft[:height, :width] > 0.5)
 
 
@@ -133,7 +133,7 @@ def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
     inner = np.zeros_like(free)
     inner[1:-1, 1:-1] = True
     free &= inner | ~rim_figure
-    regions, count = ndimage.label(free)
+    regions, _count = ndimage.label(free)
     outside = regions == regions[0, 0] if free[0, 0] else np.zeros_like(free)
     rim_regions = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
     outside |= np.isin(regions, rim_regions[rim_regions > 0])
@@ -146,9 +146,7 @@ def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
 def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:
     """Without pieces that the network does not hold for the figure, and without what sticks out far from it."""
     reach = max(3, round(0.045 * max(figure.shape)))
-    near = ndimage.distance_transform_edt(likely < 0.3) if (likely >= 0.3).any() else np.zeros(figure.shape)
     away = ndimage.distance_transform_edt(likely < 0.3)
-    del near
     figure = figure & ((away < reach) | (likely > 0.06))
     regions, count = ndimage.label(figure, np.ones((3, 3)))
     if not count:
@@ -227,15 +225,24 @@ def guided(guide: FloatArray, values: FloatArray, radius: int, softness: float) 
     channels = [guide[..., i].astype(np.float64) for i in range(3)]
     means = [mean(channel) for channel in channels]
     middle = mean(values)
-    spread = np.empty((*values.shape, 3, 3))
-    with_values = np.stack([mean(c * values) - m * middle for c, m in zip(channels, means, strict=True)], axis=-1)
-    for i in range(3):
-        for j in range(i, 3):
-            spread[..., i, j] = spread[..., j, i] = mean(channels[i] * channels[j]) - means[i] * means[j]
-        spread[..., i, i] += softness
-    slope = np.linalg.solve(spread, with_values[..., None])[..., 0]
-    shift = middle - sum(slope[..., i] * means[i] for i in range(3))
-    out = mean(shift) + sum(mean(slope[..., i]) * channels[i] for i in range(3))
+    r, g, b = (mean(c * values) - m * middle for c, m in zip(channels, means, strict=True))
+    s = {
+        (i, j): mean(channels[i] * channels[j]) - means[i] * means[j] + (softness if i == j else 0.0)
+        for i in range(3)
+        for j in range(i, 3)
+    }
+    # The inverse of a symmetric 3 × 3 matrix by cofactors.
+    c00, c01 = s[1, 1] * s[2, 2] - s[1, 2] ** 2, s[0, 2] * s[1, 2] - s[0, 1] * s[2, 2]
+    c02, c11 = s[0, 1] * s[1, 2] - s[0, 2] * s[1, 1], s[0, 0] * s[2, 2] - s[0, 2] ** 2
+    c12, c22 = s[0, 1] * s[0, 2] - s[0, 0] * s[1, 2], s[0, 0] * s[1, 1] - s[0, 1] ** 2
+    scale = 1 / (s[0, 0] * c00 + s[0, 1] * c01 + s[0, 2] * c02)
+    slope = (
+        (c00 * r + c01 * g + c02 * b) * scale,
+        (c01 * r + c11 * g + c12 * b) * scale,
+        (c02 * r + c12 * g + c22 * b) * scale,
+    )
+    shift = middle - sum(a * m for a, m in zip(slope, means, strict=True))
+    out = mean(shift) + sum(mean(a) * c for a, c in zip(slope, channels, strict=True))
     return np.asarray(out, np.float32)
 
 

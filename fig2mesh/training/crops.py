@@ -39,14 +39,24 @@ ON_PAPER: Final = 0.4
 YAWS: Final = ((0.0, 22.0, 0.64), (90.0, 22.0, 0.13), (-90.0, 22.0, 0.13), (180.0, 30.0, 0.1))
 """Mean and spread of the camera's yaw, degrees, on top of the body's own turn; and how often."""
 
-OWN: Final = {
-    "head": ("head", "hair"), "eyes": ("head",), "neck": ("head", "torso", "hair"), "thorax": ("torso",),
-    "pelvis": ("torso", "l_upper_leg", "r_upper_leg"),
-    **{f"{s}_{joint}": tuple(f"{s}_{part}" if part != "torso" else part for part in parts) for s in "lr" for joint, parts in {
-        "shoulder": ("torso", "upper_arm"), "elbow": ("upper_arm", "lower_arm"), "wrist": ("lower_arm", "hand"),
-        "hand": ("hand", "lower_arm"), "hip": ("torso", "upper_leg"), "knee": ("upper_leg", "lower_leg"),
-        "ankle": ("lower_leg", "foot"), "foot": ("foot",)}.items()},
+_LIMBS: Final = {
+    "shoulder": ("torso", "upper_arm"), "elbow": ("upper_arm", "lower_arm"), "wrist": ("lower_arm", "hand"),
+    "hand": ("hand", "lower_arm"), "hip": ("torso", "upper_leg"), "knee": ("upper_leg", "lower_leg"),
+    "ankle": ("lower_leg", "foot"), "foot": ("foot",),
 }  # fmt: skip
+
+OWN: Final = {
+    "head": ("head", "hair"),
+    "eyes": ("head",),
+    "neck": ("head", "torso", "hair"),
+    "thorax": ("torso",),
+    "pelvis": ("torso", "l_upper_leg", "r_upper_leg"),
+    **{
+        f"{side}_{joint}": tuple(part if part == "torso" else f"{side}_{part}" for part in parts)
+        for side in "lr"
+        for joint, parts in _LIMBS.items()
+    },
+}
 """A joint is drawn where its pixel, or one beside it, shows one of these parts."""
 
 ALLOWED: Final = np.zeros((len(JOINT_NAMES), 18), bool)
@@ -146,7 +156,9 @@ def _cut_out(layers: Layers, materials: list[str], rng: np.random.Generator, sty
     drawn = []
     for ground in (0.0, 255.0):
         paper = np.full((DRAWN, DRAWN, 3), ground, np.float32)
-        drawn.append(draw(layers, materials, copy.deepcopy(rng), style=style, face=face, paper=paper).astype(np.float32))
+        drawn.append(
+            draw(layers, materials, copy.deepcopy(rng), style=style, face=face, paper=paper).astype(np.float32)
+        )
     alpha = np.clip(1 - (drawn[1] - drawn[0]).mean(axis=-1, keepdims=True) / 255, 0, 1)
     colour = np.clip(drawn[0] / np.maximum(alpha, 1e-3), 0, 255)
     return np.concatenate([colour, alpha * 255], axis=-1).astype(np.uint8)
@@ -174,4 +186,3 @@ def seen_joints(labels: NDArray[np.uint8], joints: NDArray[np.floating]) -> NDAr
             near = labels[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
             out[index] = ALLOWED[index, near].any()
     return out
-

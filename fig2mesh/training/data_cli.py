@@ -69,8 +69,12 @@ def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, shapes
 @click.option(
     "-o", "--output", "out", type=FOLDER, required=True, metavar="DIR", help="Of shards; goes on with what is there."
 )
-@click.option("--bodies", type=click.IntRange(1), default=2000, show_default=True, metavar="N", help="Four drawings each.")
-@click.option("--doodles", type=click.IntRange(1), default=3200, show_default=True, metavar="N", help="Lines and blobs.")
+@click.option(
+    "--bodies", type=click.IntRange(1), default=2000, show_default=True, metavar="N", help="Four drawings each."
+)
+@click.option(
+    "--doodles", type=click.IntRange(1), default=3200, show_default=True, metavar="N", help="Lines and blobs."
+)
 @click.option("--valid", type=click.IntRange(1), default=40, show_default=True, metavar="N", help="Held-out bodies.")
 @click.option("--seed", type=click.IntRange(0, 2000), default=0, show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, metavar="N")

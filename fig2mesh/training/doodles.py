@@ -27,6 +27,8 @@ FILL: Final = 0.66
 """Share of the canvas that the skeleton takes."""
 
 Colour = tuple[float, ...]
+FILLED: Final = {"stick": 0.4, "pictogram": 1.0, "child": 0.45, "blob": 0.95, "cartoon": 0.85}
+ONE_COLOUR: Final = {"stick": 0.7, "pictogram": 0.85, "child": 0.5, "blob": 0.6, "cartoon": 0.1}
 MANNERS: Final = {"stick": 0.22, "pictogram": 0.2, "child": 0.2, "blob": 0.16, "cartoon": 0.22}
 
 BONES: Final = {
@@ -106,8 +108,8 @@ def _manner(rng: np.random.Generator) -> Manner:
         gap=0.0 if rng.random() < 0.65 else u(0.0, 0.04),
         line=0.0 if kind == "pictogram" and rng.random() < 0.6 else u(0.004, 0.022),
         union=bool(rng.random() < (0.75 if kind == "pictogram" else 0.35)),
-        filled=bool(rng.random() < {"stick": 0.4, "pictogram": 1.0, "child": 0.45, "blob": 0.95, "cartoon": 0.85}[kind]),
-        solid=bool(rng.random() < {"stick": 0.7, "pictogram": 0.85, "child": 0.5, "blob": 0.6, "cartoon": 0.1}[kind]),
+        filled=bool(rng.random() < FILLED[kind]),
+        solid=bool(rng.random() < ONE_COLOUR[kind]),
         torso_shape=str(rng.choice(["line", "hull", "ellipse", "triangle", "box"],
                                    p=[0.5, 0.1, 0.2, 0.1, 0.1] if kind == "stick" else [0.02, 0.5, 0.28, 0.1, 0.1])),
         ends=u(0.0, 0.035) if rng.random() < 0.6 else 0.0,
@@ -190,11 +192,13 @@ class _Sheet:
 
     def put(self, mask: NDArray[np.uint8], label: int, fill: Colour | None, outline: bool) -> None:
         """A shape (H, W) 0/255 in front of what is there; without a fill it hides nothing but lines under it."""
-        half = max(int(round(self.line * CANVAS * FILL)), 1)
+        half = max(round(self.line * CANVAS * FILL), 1)
         inside = mask > 127
         if outline and self.line > 0:
             grown = cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * (half // 2) + 1,) * 2)) > 127
-            shrunk = cv2.erode(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * (half - half // 2) + 1,) * 2)) > 127
+            shrunk = (
+                cv2.erode(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * (half - half // 2) + 1,) * 2)) > 127
+            )
             rim, inside = grown & ~shrunk, shrunk
             self.colour[rim], self.cover[rim] = self.ink, 1.0
             self.labels[grown] = label
@@ -241,7 +245,9 @@ def _drawn(joints: NDArray[np.float64], manner: Manner, rng: np.random.Generator
     visible = seen_joints(sheet.labels, joints[:, :2])
     visible[JOINT["eyes"]] &= face
     rgba = np.dstack([sheet.colour, sheet.cover * 255])
-    rgba, labels = _wobbled(rgba, sheet.labels, rng.uniform(0, 5) if manner.kind == "child" else rng.uniform(0, 1.5), rng)
+    rgba, labels = _wobbled(
+        rgba, sheet.labels, rng.uniform(0, 5) if manner.kind == "child" else rng.uniform(0, 1.5), rng
+    )
     rgba[..., :3] = np.where(rgba[..., 3:] > 0, rgba[..., :3], 255)
     return cut(rgba.astype(np.uint8), labels, joints, visible, MARGIN)
 
@@ -268,7 +274,12 @@ def _shapes(
             half = "arm" if kind in ("upper_arm", "lower_arm", "hand") else "leg"
             wide = limb * (1.0 if half == "arm" else rng.uniform(1.0, 1.3) if manner.kind != "stick" else 1.0)
             first, last = at[JOINT[f"{side}_{start}"]], at[JOINT[f"{side}_{end}"]]
-            widths = {"upper_arm": (1, 1), "lower_arm": (1, manner.taper), "upper_leg": (1.15, 1), "lower_leg": (1, manner.taper)}
+            widths = {
+                "upper_arm": (1, 1),
+                "lower_arm": (1, manner.taper),
+                "upper_leg": (1.15, 1),
+                "lower_leg": (1, manner.taper),
+            }
             w0, w1 = widths.get(kind, (manner.taper, manner.taper))
             mask = np.zeros((CANVAS, CANVAS), np.uint8)
             if manner.kind == "blob" and kind not in ("hand", "foot") and manner.limb > 0.045:
@@ -290,8 +301,8 @@ def _shapes(
     up = at[JOINT["head"]] - at[JOINT["neck"]]
     radius = manner.head * tall
     angle = float(np.degrees(np.arctan2(up[1], up[0])))
-    cv2.ellipse(head, _px(at[JOINT["head"]]), (int(radius * rng.uniform(0.95, 1.2)) + 1, int(radius * rng.uniform(0.85, 1.1)) + 1),
-                angle, 0, 360, 255, -1)  # fmt: skip
+    radii = (int(radius * rng.uniform(0.95, 1.2)) + 1, int(radius * rng.uniform(0.85, 1.1)) + 1)
+    cv2.ellipse(head, _px(at[JOINT["head"]]), radii, angle, 0, 360, 255, -1)
     if manner.gap == 0:
         neck = np.zeros_like(head)
         _strip(neck, at[JOINT["thorax"]], at[JOINT["head"]], max(limb * 0.9, 2), max(limb * 0.9, 2), 0.0)
@@ -318,7 +329,16 @@ def _torso(at: NDArray[np.float64], manner: Manner, tall: float, rng: np.random.
         top = neck if rng.random() < 0.6 else thorax
         centre = (top + pelvis) / 2
         angle = float(np.degrees(np.arctan2(down[1], down[0])))
-        cv2.ellipse(mask, _px(centre), (int(np.linalg.norm(pelvis - top) / 2 + 0.5 * limb) + 2, int(half) + 2), angle, 0, 360, 255, -1)
+        cv2.ellipse(
+            mask,
+            _px(centre),
+            (int(np.linalg.norm(pelvis - top) / 2 + 0.5 * limb) + 2, int(half) + 2),
+            angle,
+            0,
+            360,
+            255,
+            -1,
+        )
     elif manner.torso_shape == "triangle":
         wide = half * rng.uniform(1, 2)
         corner = np.stack([neck, pelvis + down * limb + across * wide, pelvis + down * limb - across * wide])
@@ -332,7 +352,12 @@ def _torso(at: NDArray[np.float64], manner: Manner, tall: float, rng: np.random.
     hull = cv2.convexHull(np.rint(np.concatenate([shoulders, hips, thorax[None], pelvis[None]])).astype(np.int32))
     cv2.fillPoly(mask, [hull], 255)
     reach = max(int(limb), 3) if manner.torso_shape != "hull" else max(int(limb), int(half * 0.6), 3)
-    for first, last in ((shoulders[0], shoulders[1]), (hips[0], hips[1]), (shoulders[0], hips[0]), (shoulders[1], hips[1])):
+    for first, last in (
+        (shoulders[0], shoulders[1]),
+        (hips[0], hips[1]),
+        (shoulders[0], hips[0]),
+        (shoulders[1], hips[1]),
+    ):
         cv2.line(mask, _px(first), _px(last), 255, reach)
     return mask
 
@@ -345,17 +370,21 @@ def _strip(mask: NDArray[np.uint8], first: Any, last: Any, w0: float, w1: float,
     line = first + t * way + 4 * t * (1 - t) * aside * 0.5
     for index in range(8):
         width = w0 + (w1 - w0) * (index + 0.5) / 8
-        cv2.line(mask, _px(line[index]), _px(line[index + 1]), 255, max(int(round(width)), 1))
+        cv2.line(mask, _px(line[index]), _px(line[index + 1]), 255, max(round(width), 1))
 
 
 def _oval(mask: NDArray[np.uint8], first: Any, last: Any, half: float) -> None:
     way = np.asarray(last) - first
     angle = float(np.degrees(np.arctan2(way[1], way[0])))
     length = float(np.linalg.norm(way)) / 2
-    cv2.ellipse(mask, _px((np.asarray(first) + last) / 2), (int(length * 1.08) + 2, int(half) + 2), angle, 0, 360, 255, -1)
+    cv2.ellipse(
+        mask, _px((np.asarray(first) + last) / 2), (int(length * 1.08) + 2, int(half) + 2), angle, 0, 360, 255, -1
+    )
 
 
-def _fingers(mask: NDArray[np.uint8], hand: Any, way: Any, tall: float, manner: Manner, rng: np.random.Generator) -> None:
+def _fingers(
+    mask: NDArray[np.uint8], hand: Any, way: Any, tall: float, manner: Manner, rng: np.random.Generator
+) -> None:
     base = float(np.arctan2(way[1], way[0]))
     for angle in base + np.linspace(-0.9, 0.9, int(rng.integers(3, 6))):
         tip = hand + rng.uniform(0.03, 0.06) * tall * np.array([np.cos(angle), np.sin(angle)])
@@ -363,7 +392,7 @@ def _fingers(mask: NDArray[np.uint8], hand: Any, way: Any, tall: float, manner: 
 
 
 def _px(point: Any) -> tuple[int, int]:
-    return int(round(float(point[0]))), int(round(float(point[1])))
+    return round(float(point[0])), round(float(point[1]))
 
 
 def _colours(manner: Manner, ink: Colour, rng: np.random.Generator) -> list[Colour]:
@@ -397,7 +426,10 @@ def _face(sheet: _Sheet, joints: NDArray[np.float64], manner: Manner, tall: floa
     """Eyes and mouth, at times; whether there are eyes."""
     head, eyes, neck = (joints[JOINT[name], :2] for name in ("head", "eyes", "neck"))
     averted = joints[JOINT["eyes"], 2] < joints[JOINT["head"], 2] - 1
-    if averted or rng.random() < {"stick": 0.6, "pictogram": 0.95, "child": 0.1, "blob": 0.6, "cartoon": 0.15}[manner.kind]:
+    if (
+        averted
+        or rng.random() < {"stick": 0.6, "pictogram": 0.95, "child": 0.1, "blob": 0.6, "cartoon": 0.15}[manner.kind]
+    ):
         return False
     up = (head - neck) / max(float(np.linalg.norm(head - neck)), 1.0)
     across = np.array([-up[1], up[0]])

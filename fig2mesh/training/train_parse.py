@@ -16,7 +16,18 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.figure_parser import HEAT, JOINTS, Depthwise, FigureParser, Parsed, parser_path, read_parser, save_parser
+from fig2mesh.nets.figure_parser import (
+    HEAT,
+    INPUT,
+    JOINTS,
+    MASK,
+    Depthwise,
+    FigureParser,
+    Parsed,
+    parser_path,
+    read_parser,
+    save_parser,
+)
 from fig2mesh.records import JOINT
 from fig2mesh.training.crop_data import KINDS, crops_digest, joined, load_crops
 from fig2mesh.training.crop_views import Viewer
@@ -115,11 +126,14 @@ def train_parse(
 
 
 def collate(views: list[Any]) -> dict[str, Tensor]:
-    """Views as tensors: picture (N, 3, H, W) float32 0-1, labels (N, h, w) int64, joints, visible, inside."""
+    """Views as tensors: picture (N, 3, H, W) float32 0-1, labels (N, H/2, W/2) int64, joints, visible, inside."""
+    step = INPUT // MASK
     picture = torch.from_numpy(np.stack([view.picture for view in views])).permute(0, 3, 1, 2).float() / 255
     return {
         "picture": picture.contiguous(memory_format=torch.channels_last),
-        "labels": torch.from_numpy(np.stack([view.labels for view in views])).long(),
+        "labels": torch.from_numpy(
+            np.stack([view.labels[step // 2 :: step, step // 2 :: step] for view in views])
+        ).long(),
         "joints": torch.from_numpy(np.stack([view.joints for view in views])),
         "visible": torch.from_numpy(np.stack([view.visible for view in views])),
         "inside": torch.from_numpy(np.stack([view.inside for view in views])),
@@ -215,4 +229,3 @@ def sides_right(found: NDArray[np.floating], joints: NDArray[np.floating]) -> fl
         apart = np.linalg.norm(joints[:, l] - joints[:, r], axis=1) > 0.04
         right += (same < crossed)[apart].tolist()
     return float(np.mean(right)) if right else 1.0
-

@@ -95,7 +95,7 @@ def _smooth(points: Points, closed: bool = True, steps: int = 6) -> Points:
 
 def _line(shape: tuple[int, ...], points: Points, width: float) -> NDArray[np.bool_]:
     out = np.zeros(shape[:2], np.uint8)
-    cv2.polylines(out, [np.rint(points).astype(np.int32)], False, 1, max(int(round(width)), 1))
+    cv2.polylines(out, [np.rint(points).astype(np.int32)], False, 1, max(round(width), 1))
     return out > 0
 
 
@@ -123,7 +123,9 @@ def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     hips = np.stack(_at(joints, "l_hip", "r_hip"))
     legs = np.stack(_at(joints, "l_knee", "r_knee", "l_ankle", "r_ankle"))
     end = rng.uniform(0.5, 1.1)
-    low = np.concatenate([legs[:2] * (1 - end) + legs[2:] * end if end <= 1 else legs[2:] + [0, (end - 1) * tall * 0.3]])
+    low = np.concatenate(
+        [legs[:2] * (1 - end) + legs[2:] * end if end <= 1 else legs[2:] + [0, (end - 1) * tall * 0.3]]
+    )
     down = low.mean(axis=0) - pelvis
     if np.linalg.norm(down) < 0.2 * tall:
         return []
@@ -141,7 +143,9 @@ def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     wide = float(np.abs((hips - pelvis) @ across).max()) + waist
     hem = [pelvis + across * (left + (right - left) * t) + down * (reach + rng.normal(0, 0.012) * tall)
            for t in np.linspace(0, 1, 6)]  # fmt: skip
-    outline = np.stack([top - across * waist, pelvis - across * wide, *hem, pelvis + across * wide, top + across * waist])
+    outline = np.stack(
+        [top - across * waist, pelvis - across * wide, *hem, pelvis + across * wide, top + across * waist]
+    )
     mask = _polygon(shape, _smooth(outline))
     return [Thing(mask, PART["garment"], "cloth.gown", True, (*ARMS, PART["head"]) if rng.random() < 0.9 else ())]
 
@@ -170,13 +174,21 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     kind = rng.choice(["long", "bob", "bun", "tail", "spikes", "beard"])
     if kind == "beard" and not averted:
         low = eyes - up * rng.uniform(0.9, 2.2) * size
-        outline = np.stack([eyes - up * 0.5 * size + across * 0.45 * size, low, eyes - up * 0.5 * size - across * 0.45 * size])
+        outline = np.stack(
+            [eyes - up * 0.5 * size + across * 0.45 * size, low, eyes - up * 0.5 * size - across * 0.45 * size]
+        )
         return [Thing(_polygon(shape, _smooth(outline)), PART["hair"], "hair", True)]
     if kind in ("long", "bob"):
         length, wide = (rng.uniform(1.2, 2.6) if kind == "long" else rng.uniform(0.4, 0.9)), rng.uniform(0.75, 1.3)
         outline = [head + up * 1.0 * size]
-        outline += [head + across * wide * size * 0.9 + up * 0.5 * size, head + across * wide * size - up * length * size]
-        outline += [head - across * wide * size - up * length * size, head - across * wide * size * 0.9 + up * 0.5 * size]
+        outline += [
+            head + across * wide * size * 0.9 + up * 0.5 * size,
+            head + across * wide * size - up * length * size,
+        ]
+        outline += [
+            head - across * wide * size - up * length * size,
+            head - across * wide * size * 0.9 + up * 0.5 * size,
+        ]
         mask = _polygon(shape, _smooth(np.stack(outline)))
         return [Thing(mask, PART["hair"], "hair", bool(averted))]
     if kind == "bun":
@@ -186,11 +198,18 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     if kind == "spikes":
         angles = np.linspace(-1.6, 1.6, int(rng.integers(9, 23)))
         reach = np.where(np.arange(len(angles)) % 2, rng.uniform(1.05, 1.5), 0.6) * size
-        outline = np.stack([head + r * (up * np.cos(a) + across * np.sin(a)) for a, r in zip(angles, reach, strict=True)])
+        outline = np.stack(
+            [head + r * (up * np.cos(a) + across * np.sin(a)) for a, r in zip(angles, reach, strict=True)]
+        )
         return [Thing(_polygon(shape, outline), PART["hair"], "hair", bool(averted))]
     side = float(rng.choice([-1.0, 1.0]))
-    way = np.stack([head + up * 0.3 * size, head + across * side * size, head + across * side * rng.uniform(0.9, 1.4) * size
-                    - up * rng.uniform(0.5, 1.6) * size])  # fmt: skip
+    way = np.stack(
+        [
+            head + up * 0.3 * size,
+            head + across * side * size,
+            head + across * side * rng.uniform(0.9, 1.4) * size - up * rng.uniform(0.5, 1.6) * size,
+        ]
+    )
     return [Thing(_line(shape, _smooth(way, False), rng.uniform(0.25, 0.5) * size), PART["hair"], "hair", False)]
 
 
@@ -204,7 +223,12 @@ def _hat(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> li
     half, brim, high = rng.uniform(0.55, 0.8) * size, rng.uniform(0.6, 1.5) * size, rng.uniform(0.4, 1.3) * size
     kind = rng.choice(["brim", "point", "cap", "crown"], p=[0.4, 0.2, 0.3, 0.1])
     top = rng.uniform(0.4, 1.1) * half if kind in ("brim", "cap") else 0.05 * half
-    outline = [base - across * half, base - across * top + up * high, base + across * top + up * high, base + across * half]
+    outline = [
+        base - across * half,
+        base - across * top + up * high,
+        base + across * top + up * high,
+        base + across * half,
+    ]
     if kind == "crown":
         teeth = [base + across * half * (1 - t / 3) + up * high * 0.6 * (1 if t % 2 == 0 else 0.5) for t in range(7)]
         outline = [base - across * half, *teeth[::-1], base + across * half]
@@ -244,8 +268,12 @@ def _held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
         mask = _line(shape, np.stack([hand - up * below, head]), thick)
         if kind == "flag":
             wide = rng.uniform(0.1, 0.3) * tall * rng.choice([-1, 1])
-            flag = [head, head + across * wide + up * rng.normal(0, 0.03) * tall, head + across * wide - up * 0.15 * tall,
-                    head - up * 0.17 * tall]  # fmt: skip
+            flag = [
+                head,
+                head + across * wide + up * rng.normal(0, 0.03) * tall,
+                head + across * wide - up * 0.15 * tall,
+                head - up * 0.17 * tall,
+            ]
             mask |= _polygon(shape, np.stack(flag))
         if kind == "umbrella":
             wide = rng.uniform(0.12, 0.26) * tall
@@ -272,10 +300,16 @@ def _held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
                                           low + [-wide, wide * 1.4]]))  # fmt: skip
     elif kind == "cup":
         wide, high = rng.uniform(0.02, 0.05) * tall, rng.uniform(0.05, 0.13) * tall
-        cup = [hand - across * wide + up * high, hand - across * wide * 0.6 + up * high * 0.3, hand - across * wide * 0.2,
-               hand - across * wide * 0.7 - up * high * 0.4, hand + across * wide * 0.7 - up * high * 0.4,
-               hand + across * wide * 0.2, hand + across * wide * 0.6 + up * high * 0.3,
-               hand + across * wide + up * high]  # fmt: skip
+        cup = [
+            hand - across * wide + up * high,
+            hand - across * wide * 0.6 + up * high * 0.3,
+            hand - across * wide * 0.2,
+            hand - across * wide * 0.7 - up * high * 0.4,
+            hand + across * wide * 0.7 - up * high * 0.4,
+            hand + across * wide * 0.2,
+            hand + across * wide * 0.6 + up * high * 0.3,
+            hand + across * wide + up * high,
+        ]
         mask = _polygon(shape, np.stack(cup))
     elif kind == "flowers":
         mask = np.zeros(shape[:2], bool)
@@ -287,6 +321,8 @@ def _held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     else:
         size = rng.uniform(0.025, 0.07, 2) * tall
         centre = hand + up * rng.uniform(-0.3, 1) * size[1]
-        corner = np.stack([centre + sx * across * size[0] + sy * up * size[1] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))])
+        corner = np.stack(
+            [centre + sx * across * size[0] + sy * up * size[1] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        )
         mask = _polygon(shape, corner) if kind == "box" else _ellipse(shape, centre, (size[0], size[0]), 0)
     return [Thing(mask, PART["prop"], "cloth.held", front, spared)]
