@@ -18,9 +18,6 @@ CHAINS: Final = (("shoulder", "elbow", "wrist", "hand"), ("hip", "knee", "ankle"
 APART: Final = 0.06
 """Two joints of a pair nearer than this share of the figure's height may be one place found twice."""
 
-SWITCH: Final = 0.8
-"""What it costs, in log-likelihood, to cross from one side to the other along a limb."""
-
 UNSURE: Final = 0.3
 """Likelihood below which a joint is reported."""
 
@@ -77,7 +74,7 @@ def _sides(
     pairs = []
     for name in chain:
         left, right = JOINT[f"l_{name}"], JOINT[f"r_{name}"]
-        first, second = places[left], places[right]
+        first, second = places[left].copy(), places[right].copy()
         if np.linalg.norm(first - second) < APART * tall and name not in ("shoulder", "hip"):
             first, second = _two_places(heat[left], heat[right], first, second, tall)
         pairs.append((left, right, first, second))
@@ -85,11 +82,10 @@ def _sides(
     for step, (left, right, first, second) in enumerate(pairs):
         logs = [[np.log(around(heat[joint], place)[1] + 1e-4) for place in (first, second)] for joint in (left, right)]
         cost[step] = -(logs[0][0] + logs[1][1]), -(logs[0][1] + logs[1][0])
-    # The root of a limb says whose it is only together with the rest of it.
     total, back = cost[0].copy(), []
     for step in range(1, len(pairs)):
         bend = np.array([[_stretch(pairs[step - 1], pairs[step], a, b) for a in (0, 1)] for b in (0, 1)])
-        choice = total[None, :] + SWITCH * (1 - np.eye(2)) + bend
+        choice = total[None, :] + bend
         back.append(choice.argmin(axis=1))
         total = choice.min(axis=1) + cost[step]
     state = int(total.argmin())

@@ -22,6 +22,9 @@ WORKING: Final = 800
 PLAIN_SHARE: Final = 0.7
 """A ground is plain where this share of what the network calls ground has the colour of a smooth sheet."""
 
+ROUGH: Final = 7.0
+"""Grain of paper beyond which a ground is not plain, 0-255."""
+
 AGREED: Final = 0.72
 """IoU with the guess from which an outline that lines have is believed."""
 
@@ -93,7 +96,7 @@ def plain_sheet(rgb: FloatArray, likely: FloatArray) -> Sheet | None:
             return None
         fit, *_ = np.linalg.lstsq(base[kept, :terms], colours[kept], rcond=None)
         rest = np.abs(colours - base[:, :terms] @ fit).max(axis=1)
-        noise = max(1.5 * float(np.median(rest[kept])), 1.0)
+        noise = float(np.clip(1.5 * np.median(rest[kept]), 1.0, ROUGH))
         kept = rest < max(4 * noise, 9)
     grid_y, grid_x = np.mgrid[:height, :width]
     gx, gy = (grid_x / width - 0.5).ravel(), (grid_y / height - 0.5).ravel()
@@ -138,7 +141,10 @@ def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
     rim_regions = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
     outside |= np.isin(regions, rim_regions[rim_regions > 0])
     outside = outside[1:-1, 1:-1]
-    figure = ~_grown(outside, gap) | (line & ~outside) if gap else ~outside
+    if gap:
+        # Back to the lines, round corners too; through a gap only a little way.
+        outside = ndimage.binary_dilation(outside, np.ones((3, 3)), iterations=gap + 1, mask=~line)
+    figure = ~outside
     figure = _without_others(figure, likely)
     return _without_holes(figure, line, likely)
 
