@@ -1,9 +1,8 @@
 """A crisp silhouette from a coarse one: what the picture's own lines and colours say of a network's guess.
 
-Two ways, and the better one by agreement with the guess. On plain grounds (paper, one colour, soft gradients), all
-that can be reached from the rim without crossing a line is ground. Elsewhere, colours of what is surely figure and
-surely ground decide near the guessed outline, smoothed along the picture's edges by a guided filter
-(He, Sun, Tang 2013).
+Colours of what is surely figure and surely ground decide near the guessed outline, smoothed along the picture's edges
+by a guided filter (He, Sun, Tang 2013). On plain grounds (paper, one colour, soft gradients) lines know better: all
+that can be reached from the rim without crossing one is ground. Where the two differ, the guess decides piece by piece.
 """
 
 from __future__ import annotations
@@ -27,6 +26,14 @@ ROUGH: Final = 7.0
 
 AGREED: Final = 0.72
 """IoU with the guess from which an outline that lines have is believed."""
+
+BESIDE: Final = 0.3
+LOST: Final = 0.8
+"""Pieces that lines enclose and colours do not are left out below the one likelihood; those that colours find and
+lines do not are taken in above the other."""
+
+BLUR: Final = 3
+"""Width of the rim that scans blur, pixels."""
 
 GAPS: Final = (0, 1, 2, 4, 7, 11)
 """Half widths of gaps in the drawn outline that are bridged, pixels of the working size."""
@@ -64,12 +71,29 @@ def _outline(rgb: FloatArray, likely: FloatArray) -> BoolArray:
     guess = likely > 0.5
     if not guess.any():
         return guess
+    coloured = by_colour(rgb, likely)
     sheet = plain_sheet(rgb, likely)
-    if sheet is not None and sheet.share >= PLAIN_SHARE:
-        best, score = _enclosed(sheet, likely)
-        if score >= AGREED:
-            return best
-    return by_colour(rgb, likely)
+    if sheet is None or sheet.share < PLAIN_SHARE:
+        return coloured
+    enclosed, score = _enclosed(sheet, likely)
+    return _merged(enclosed, coloured, likely) if score >= AGREED else coloured
+
+
+def _merged(enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
+    """What lines enclose, without what stands or lies beside the figure, and with what a gap in its outline lost."""
+    beside = _pieces(enclosed & ~coloured, likely, below=BESIDE)
+    lost = _pieces(coloured & ~enclosed, likely, above=LOST)
+    return (enclosed & ~beside) | lost
+
+
+def _pieces(mask: BoolArray, likely: FloatArray, below: float = 2.0, above: float = -1.0) -> BoolArray:
+    """The connected pieces of a mask whose mean likelihood lies between."""
+    regions, count = ndimage.label(mask, np.ones((3, 3)))
+    if not count:
+        return np.zeros_like(mask)
+    index = np.arange(1, count + 1)
+    mean = ndimage.mean(likely, regions, index)
+    return np.asarray(np.isin(regions, index[(mean < below) & (mean > above)]))
 
 
 def plain_sheet(rgb: FloatArray, likely: FloatArray) -> Sheet | None:
@@ -119,6 +143,7 @@ def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
     best, top = likely > 0.5, -1.0
     for gap in GAPS:
         found = _flooded(line, likely, gap)
+        found = _half_way(found, sheet.away)
         score = agreement(found, likely)
         # Wider bridges round off corners: they must earn it.
         if score > top + (0.01 if gap else 0):
@@ -147,6 +172,13 @@ def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
     figure = ~outside
     figure = _without_others(figure, likely)
     return _without_holes(figure, line, likely)
+
+
+def _half_way(figure: BoolArray, away: FloatArray) -> BoolArray:
+    """The figure without the paler half of its blurred rim: an edge is where a line has half of its strength."""
+    soft = away < 0.5 * ndimage.maximum_filter(away, 2 * BLUR + 1)
+    outside = ndimage.binary_dilation(~figure, iterations=BLUR, mask=soft | ~figure)
+    return np.asarray(~outside)
 
 
 def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:

@@ -6,7 +6,7 @@ so that the draughtsman fills and outlines it as he does the body.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import cv2
 import numpy as np
@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from fig2mesh.records import JOINT, PART
 from fig2mesh.training.drawing import Layers
-
-Points = NDArray[np.float64]
+from fig2mesh.training.held import held
+from fig2mesh.training.thing_shapes import Points, Thing, at, ellipse, line, polygon, smooth, tall_of
 
 SHARES: Final = {"gown": 0.14, "cape": 0.07, "hair": 0.14, "hat": 0.2, "held": 0.28, "pack": 0.06}
 """How often each kind is worn or carried."""
@@ -25,24 +25,13 @@ OVER, UNDER = 0.02, 0.4
 """How far before what it covers, and how far behind the body, a thing lies, FIGURE units."""
 
 
-class Thing(NamedTuple):
-    """mask : (H, W) bool; label : part label; material : its name; front : whether it covers the body behind it;
-    spared : labels that stay before it"""
-
-    mask: NDArray[np.bool_]
-    label: int
-    material: str
-    front: bool
-    spared: tuple[int, ...] = ()
-
-
 def things(joints: Points, labels: NDArray[np.uint8], rng: np.random.Generator) -> list[Thing]:
     """What a body wears and carries, at random.
 
     joints : (21, 3) x, y in pixels, z to the viewer in pixels; labels : (H, W) uint8 of the body
     """
     made: list[Thing] = []
-    makers = {"cape": _cape, "pack": _pack, "gown": _gown, "hair": _hair, "hat": _hat, "held": _held}
+    makers = {"cape": _cape, "pack": _pack, "gown": _gown, "hair": _hair, "hat": _hat, "held": held}
     for kind, make in makers.items():
         if rng.random() < SHARES[kind]:
             made += make(joints, labels.shape, rng)
@@ -78,50 +67,12 @@ def _bulge(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True), np.float32)
 
 
-def _polygon(shape: tuple[int, ...], points: Points) -> NDArray[np.bool_]:
-    out = np.zeros(shape[:2], np.uint8)
-    cv2.fillPoly(out, [np.rint(points).astype(np.int32)], 1)
-    return out > 0
-
-
-def _smooth(points: Points, closed: bool = True, steps: int = 6) -> Points:
-    """A rounded line through points (Chaikin's corners cut)."""
-    for _ in range(steps // 2):
-        after = np.roll(points, -1, axis=0) if closed else points[1:]
-        before = points if closed else points[:-1]
-        points = np.stack([0.75 * before + 0.25 * after, 0.25 * before + 0.75 * after], axis=1).reshape(-1, 2)
-    return points
-
-
-def _line(shape: tuple[int, ...], points: Points, width: float) -> NDArray[np.bool_]:
-    out = np.zeros(shape[:2], np.uint8)
-    cv2.polylines(out, [np.rint(points).astype(np.int32)], False, 1, max(round(width), 1))
-    return out > 0
-
-
-def _ellipse(shape: tuple[int, ...], centre: Points, radii: tuple[float, float], angle: float) -> NDArray[np.bool_]:
-    out = np.zeros(shape[:2], np.uint8)
-    axes = (max(int(radii[0]), 1), max(int(radii[1]), 1))
-    cv2.ellipse(out, (int(centre[0]), int(centre[1])), axes, np.degrees(angle), 0, 360, 1, -1)
-    return out > 0
-
-
-def _at(joints: Points, *names: str) -> list[Points]:
-    return [joints[JOINT[name], :2] for name in names]
-
-
-def _tall(joints: Points) -> float:
-    """Length of the body along its bones, pixels."""
-    head, pelvis, knee, ankle = _at(joints, "head", "pelvis", "l_knee", "l_ankle")
-    return float(np.linalg.norm(head - pelvis) * 1.3 + np.linalg.norm(pelvis - knee) + np.linalg.norm(knee - ankle))
-
-
 def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """A skirt from the waist, or a robe from the chest, to somewhere between knees and ground."""
-    tall = _tall(joints)
-    pelvis, thorax = _at(joints, "pelvis", "thorax")
-    hips = np.stack(_at(joints, "l_hip", "r_hip"))
-    legs = np.stack(_at(joints, "l_knee", "r_knee", "l_ankle", "r_ankle"))
+    tall = tall_of(joints)
+    pelvis, thorax = at(joints, "pelvis", "thorax")
+    hips = np.stack(at(joints, "l_hip", "r_hip"))
+    legs = np.stack(at(joints, "l_knee", "r_knee", "l_ankle", "r_ankle"))
     end = rng.uniform(0.5, 1.1)
     low = np.concatenate(
         [legs[:2] * (1 - end) + legs[2:] * end if end <= 1 else legs[2:] + [0, (end - 1) * tall * 0.3]]
@@ -146,14 +97,14 @@ def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     outline = np.stack(
         [top - across * waist, pelvis - across * wide, *hem, pelvis + across * wide, top + across * waist]
     )
-    mask = _polygon(shape, _smooth(outline))
+    mask = polygon(shape, smooth(outline))
     return [Thing(mask, PART["garment"], "cloth.gown", True, (*ARMS, PART["head"]) if rng.random() < 0.9 else ())]
 
 
 def _cape(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """Cloth from the shoulders or the crown that hangs behind: capes, veils."""
-    tall = _tall(joints)
-    left, right, pelvis, thorax, head = _at(joints, "l_shoulder", "r_shoulder", "pelvis", "thorax", "head")
+    tall = tall_of(joints)
+    left, right, pelvis, thorax, head = at(joints, "l_shoulder", "r_shoulder", "pelvis", "thorax", "head")
     down = (pelvis - thorax) / max(float(np.linalg.norm(pelvis - thorax)), 1.0)
     across = np.array([-down[1], down[0]])
     length, wide, drift = rng.uniform(0.3, 0.75) * tall, rng.uniform(0.1, 0.24) * tall, rng.normal(0, 0.1) * tall
@@ -161,12 +112,12 @@ def _cape(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     start.sort(key=lambda point: float(point @ across))
     foot = thorax + down * length + across * drift
     outline = np.stack([start[0], foot - across * wide, foot + down * 0.03 * tall, foot + across * wide, start[1]])
-    return [Thing(_polygon(shape, _smooth(outline)), PART["garment"], "cloth.cape", False)]
+    return [Thing(polygon(shape, smooth(outline)), PART["garment"], "cloth.cape", False)]
 
 
 def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """Long or wide hair: behind the head, or a bun, a tail, a beard before it."""
-    head, eyes, neck = _at(joints, "head", "eyes", "neck")
+    head, eyes, neck = at(joints, "head", "eyes", "neck")
     up = head - neck
     size = max(float(np.linalg.norm(up)), 4.0)
     up, across = up / size, np.array([-up[1], up[0]]) / size
@@ -177,7 +128,7 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
         outline = np.stack(
             [eyes - up * 0.5 * size + across * 0.45 * size, low, eyes - up * 0.5 * size - across * 0.45 * size]
         )
-        return [Thing(_polygon(shape, _smooth(outline)), PART["hair"], "hair", True)]
+        return [Thing(polygon(shape, smooth(outline)), PART["hair"], "hair", True)]
     if kind in ("long", "bob"):
         length, wide = (rng.uniform(1.2, 2.6) if kind == "long" else rng.uniform(0.4, 0.9)), rng.uniform(0.75, 1.3)
         outline = [head + up * 1.0 * size]
@@ -189,19 +140,19 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
             head - across * wide * size - up * length * size,
             head - across * wide * size * 0.9 + up * 0.5 * size,
         ]
-        mask = _polygon(shape, _smooth(np.stack(outline)))
+        mask = polygon(shape, smooth(np.stack(outline)))
         return [Thing(mask, PART["hair"], "hair", bool(averted))]
     if kind == "bun":
         where = head + up * rng.uniform(0.6, 1.1) * size + across * rng.normal(0, 0.5) * size
         radius = rng.uniform(0.25, 0.5) * size
-        return [Thing(_ellipse(shape, where, (radius, radius), 0), PART["hair"], "hair", bool(averted))]
+        return [Thing(ellipse(shape, where, (radius, radius), 0), PART["hair"], "hair", bool(averted))]
     if kind == "spikes":
         angles = np.linspace(-1.6, 1.6, int(rng.integers(9, 23)))
         reach = np.where(np.arange(len(angles)) % 2, rng.uniform(1.05, 1.5), 0.6) * size
         outline = np.stack(
             [head + r * (up * np.cos(a) + across * np.sin(a)) for a, r in zip(angles, reach, strict=True)]
         )
-        return [Thing(_polygon(shape, outline), PART["hair"], "hair", bool(averted))]
+        return [Thing(polygon(shape, outline), PART["hair"], "hair", bool(averted))]
     side = float(rng.choice([-1.0, 1.0]))
     way = np.stack(
         [
@@ -210,12 +161,12 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
             head + across * side * rng.uniform(0.9, 1.4) * size - up * rng.uniform(0.5, 1.6) * size,
         ]
     )
-    return [Thing(_line(shape, _smooth(way, False), rng.uniform(0.25, 0.5) * size), PART["hair"], "hair", False)]
+    return [Thing(line(shape, smooth(way, False), rng.uniform(0.25, 0.5) * size), PART["hair"], "hair", False)]
 
 
 def _hat(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """A brim with a crown, a point, a cap, a crown of spikes."""
-    head, neck = _at(joints, "head", "neck")
+    head, neck = at(joints, "head", "neck")
     up = head - neck
     size = max(float(np.linalg.norm(up)), 4.0)
     up, across = up / size, np.array([-up[1], up[0]]) / size
@@ -232,97 +183,18 @@ def _hat(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> li
     if kind == "crown":
         teeth = [base + across * half * (1 - t / 3) + up * high * 0.6 * (1 if t % 2 == 0 else 0.5) for t in range(7)]
         outline = [base - across * half, *teeth[::-1], base + across * half]
-    mask = _polygon(shape, np.stack(outline) if kind != "cap" else _smooth(np.stack(outline)))
+    mask = polygon(shape, np.stack(outline) if kind != "cap" else smooth(np.stack(outline)))
     if kind == "brim" or (kind != "crown" and rng.random() < 0.3):
-        mask |= _ellipse(shape, base, (brim, rng.uniform(0.08, 0.25) * size), float(np.arctan2(across[1], across[0])))
+        mask |= ellipse(shape, base, (brim, rng.uniform(0.08, 0.25) * size), float(np.arctan2(across[1], across[0])))
     return [Thing(mask, PART["hair"], "hat", True)]
 
 
 def _pack(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """A bag on the back: behind the body seen from the front, before it from behind."""
-    thorax, pelvis = _at(joints, "thorax", "pelvis")
-    tall, turned = _tall(joints), joints[JOINT["eyes"], 2] < joints[JOINT["head"], 2]
+    thorax, pelvis = at(joints, "thorax", "pelvis")
+    tall, turned = tall_of(joints), joints[JOINT["eyes"], 2] < joints[JOINT["head"], 2]
     side = joints[JOINT["head"], :2] - joints[JOINT["eyes"], :2]
     centre = (0.7 * thorax + 0.3 * pelvis) + np.array([np.sign(side[0]), 0]) * min(abs(side[0]), 0.1 * tall)
     box = rng.uniform(0.07, 0.13, 2) * tall * [1, 1.5]
     corner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * box + centre
-    return [Thing(_polygon(shape, _smooth(corner, steps=4)), PART["prop"], "cloth.pack", bool(turned), ARMS)]
-
-
-def _held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
-    """A staff, sword, flag, umbrella, tool, cup, ball, box, bag, flowers or a shield in one hand."""
-    side = str(rng.choice(["l", "r"]))
-    hand, wrist = _at(joints, f"{side}_hand", f"{side}_wrist")
-    tall = _tall(joints)
-    tilt = rng.normal(0, 0.25)
-    up = np.array([np.sin(tilt), -np.cos(tilt)])
-    across = np.array([-up[1], up[0]])
-    front = bool(rng.random() < 0.6)
-    spared = (PART[f"{side}_hand"],) if rng.random() < 0.6 else ()
-    kind = rng.choice(["staff", "sword", "flag", "umbrella", "tool", "cup", "ball", "box", "bag", "flowers", "shield"])
-    thick = rng.uniform(0.006, 0.02) * tall
-    if kind in ("staff", "flag", "umbrella", "tool"):
-        above = rng.uniform(0.15, 0.7) * tall
-        below = rng.uniform(0.05, 0.5) * tall if kind != "umbrella" else rng.uniform(0.02, 0.06) * tall
-        head = hand + up * above
-        mask = _line(shape, np.stack([hand - up * below, head]), thick)
-        if kind == "flag":
-            wide = rng.uniform(0.1, 0.3) * tall * rng.choice([-1, 1])
-            flag = [
-                head,
-                head + across * wide + up * rng.normal(0, 0.03) * tall,
-                head + across * wide - up * 0.15 * tall,
-                head - up * 0.17 * tall,
-            ]
-            mask |= _polygon(shape, np.stack(flag))
-        if kind == "umbrella":
-            wide = rng.uniform(0.12, 0.26) * tall
-            arc = [head + wide * (across * np.cos(a) + up * np.sin(a) * 0.7) for a in np.linspace(0, np.pi, 9)]
-            mask |= _polygon(shape, np.stack(arc))
-        if kind == "tool":
-            blade = rng.uniform(0.02, 0.1, 2) * tall
-            mask |= _polygon(shape, np.stack([head + across * blade[0], head + across * blade[0] - up * blade[1],
-                                              head - across * blade[0] * rng.uniform(0, 1), head]))  # fmt: skip
-    elif kind == "sword":
-        way = hand - wrist
-        turn = way / max(float(np.linalg.norm(way)), 1e-3) if rng.random() < 0.5 else up
-        end = hand + turn * rng.uniform(0.2, 0.45) * tall
-        side_way = np.array([-turn[1], turn[0]])
-        guard = hand + turn * 0.03 * tall
-        mask = _line(shape, np.stack([hand - turn * 0.03 * tall, end]), rng.uniform(0.01, 0.025) * tall)
-        mask |= _line(shape, np.stack([guard - side_way * 0.04 * tall, guard + side_way * 0.04 * tall]), thick)
-    elif kind == "bag":
-        drop, wide = rng.uniform(0.04, 0.15) * tall, rng.uniform(0.04, 0.1) * tall
-        low = hand + [0, drop]
-        mask = _line(shape, np.stack([hand, low + [wide * 0.6, 0]]), thick * 0.7)
-        mask |= _line(shape, np.stack([hand, low - [wide * 0.6, 0]]), thick * 0.7)
-        mask |= _polygon(shape, np.stack([low + [-wide * 0.8, 0], low + [wide * 0.8, 0], low + [wide, wide * 1.4],
-                                          low + [-wide, wide * 1.4]]))  # fmt: skip
-    elif kind == "cup":
-        wide, high = rng.uniform(0.02, 0.05) * tall, rng.uniform(0.05, 0.13) * tall
-        cup = [
-            hand - across * wide + up * high,
-            hand - across * wide * 0.6 + up * high * 0.3,
-            hand - across * wide * 0.2,
-            hand - across * wide * 0.7 - up * high * 0.4,
-            hand + across * wide * 0.7 - up * high * 0.4,
-            hand + across * wide * 0.2,
-            hand + across * wide * 0.6 + up * high * 0.3,
-            hand + across * wide + up * high,
-        ]
-        mask = _polygon(shape, np.stack(cup))
-    elif kind == "flowers":
-        mask = np.zeros(shape[:2], bool)
-        for _ in range(int(rng.integers(3, 9))):
-            where = hand + up * rng.uniform(0, 0.08) * tall + across * rng.normal(0, 0.03) * tall
-            mask |= _ellipse(shape, where, (0.02 * tall, 0.02 * tall), 0)
-    elif kind == "shield":
-        mask = _ellipse(shape, wrist, tuple(rng.uniform(0.07, 0.14, 2) * tall), tilt)
-    else:
-        size = rng.uniform(0.025, 0.07, 2) * tall
-        centre = hand + up * rng.uniform(-0.3, 1) * size[1]
-        corner = np.stack(
-            [centre + sx * across * size[0] + sy * up * size[1] for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        )
-        mask = _polygon(shape, corner) if kind == "box" else _ellipse(shape, centre, (size[0], size[0]), 0)
-    return [Thing(mask, PART["prop"], "cloth.held", front, spared)]
+    return [Thing(polygon(shape, smooth(corner, steps=4)), PART["prop"], "cloth.pack", bool(turned), ARMS)]
