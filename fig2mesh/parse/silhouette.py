@@ -21,6 +21,9 @@ WORKING: Final = 800
 PLAIN_SHARE: Final = 0.7
 """A ground is plain where this share of what the network calls ground has the colour of a smooth sheet."""
 
+FAINT: Final = 10.0
+"""Colours nearer to the ground's than this are the ground's, 0-255."""
+
 ROUGH: Final = 7.0
 """Grain of paper beyond which a ground is not plain, 0-255."""
 
@@ -139,7 +142,7 @@ def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
     """What lines or colours enclose, for the gap width whose result agrees best with the guess; and how well."""
-    line = sheet.away > max(5 * sheet.noise, 16)
+    line = sheet.away > max(5 * sheet.noise, FAINT)
     best, top = likely > 0.5, -1.0
     for gap in GAPS:
         found = _flooded(line, likely, gap)
