@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__, annotate_cli, globe_cli, render_cli, tileset_cli, view_cli
+from fig2mesh import __version__, annotate_cli, globe_cli, parse_cli, render_cli, tileset_cli, view_cli
 from fig2mesh.figure_options import FILE, figure_files, messages, place_options
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
@@ -58,7 +58,8 @@ class MainJobGroup(click.Group):
 def cli() -> None:
     """Turn one drawn human figure into a closed, textured, georeferenced 3D model.
 
-    FIGURE is a picture with a transparent background, or any picture with --mask; its joints come from --keypoints.
+    FIGURE is a picture of one figure. Its silhouette is the transparency or --mask, its joints are --keypoints; what
+    is missing is inferred from the picture.
     """
 
 
@@ -197,6 +198,7 @@ def doctor() -> None:
         raise SystemExit(1)
 
 
+parse_cli.add_to(cli)
 render_cli.add_to(cli)
 view_cli.add_to(cli)
 tileset_cli.add_to(cli)

@@ -44,9 +44,10 @@ def _filters() -> tuple[str, bool, str]:
 
 def _weights() -> tuple[str, bool, str]:
     try:
-        from fig2mesh.nets import part_size, pose_lift, weights
+        from fig2mesh.nets import figure_parser, part_size, pose_lift, weights
         from fig2mesh.parts.kinds import KINDS
 
+        figure_parser.load()
         pose_lift.load()
         for kind in KINDS:
             part_size.load(kind)

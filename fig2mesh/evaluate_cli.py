@@ -87,6 +87,34 @@ def textures(source: Path, runs: Path | None, bodies: int, out: Path | None, ove
     _write(evaluate_textures(source, runs, bodies, lambda line: click.echo(line, err=True)), out)
 
 
+@evaluate.command()
+@click.option("--figures", type=FOLDER, metavar="DIR", help="Folders with image.png, mask.png, keypoints.json.")
+@click.option("--data", "source", type=FOLDER, metavar="DIR", help="What `data crops` made: its held-out crops.")
+@click.option("--count", type=click.IntRange(1), default=160, show_default=True, metavar="N", help="Crops of a split.")
+@click.option("--blazepose", type=FILE, metavar="TFLITE", help="Score pose_landmark_heavy.tflite on the crops too.")
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def parse(
+    figures: Path | None, source: Path | None, count: int, blazepose: Path | None, out: Path | None, overwrite: bool
+) -> None:
+    """Silhouettes and joints from bare pictures: annotated drawings, held-out crops, or both."""
+    from fig2mesh.errors import InputError
+
+    if figures is None and source is None:
+        raise InputError("evaluate parse", "nothing to measure", "pass --figures DIR, --data DIR or both")
+    _check(() if out is None else (out,), overwrite)
+    text = ""
+    if source is not None:
+        from fig2mesh.training.evaluate_crops import evaluate_crops
+
+        text += evaluate_crops(source, count, blazepose, lambda line: click.echo(line, err=True))
+    if figures is not None:
+        from fig2mesh.evaluate_parse import evaluate_parse
+
+        text += evaluate_parse(figures, lambda line: click.echo(line, err=True))
+    _write(text, out)
+
+
 def _check(paths: tuple[Path, ...], overwrite: bool) -> None:
     """Refuse outputs before the work begins; make their folder."""
     from fig2mesh.errors import OutputError

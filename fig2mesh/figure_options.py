@@ -21,10 +21,10 @@ TRANSFORMS = ("auto", "helmert", "affine", "poly1", "poly2", "poly3", "tps", "pr
 
 def figure_files(command: F) -> F:
     """What belongs to the picture of a figure: silhouette, joints, parts, and where it is."""
-    silhouette = "Silhouette, bright on dark; default: the alpha channel."
+    silhouette = "Silhouette, bright on dark; default: the alpha channel, or inferred."
     options = (
         click.option("--mask", type=FILE, metavar="PNG", help=silhouette),
-        click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints."),
+        click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints; default: inferred."),
         click.option("--part-labels", type=FILE, metavar="PNG", help="Part label of every pixel."),
         click.option(
             "--bbox", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Part of the picture that holds the figure."

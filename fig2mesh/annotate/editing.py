@@ -13,8 +13,9 @@ import numpy as np
 from fig2mesh.errors import FigureError, InputError
 from fig2mesh.parse.annotation import COLOURS, Annotation
 from fig2mesh.parse.joint_writers import SKELETON
-from fig2mesh.parse.keypoints import read_keypoints
-from fig2mesh.parse.read import read_labels, read_mask, read_view
+from fig2mesh.parse.keypoints import Joints
+from fig2mesh.parse.picture import on_white, read_labels, read_mask, read_view
+from fig2mesh.parse.read import joints_of_view
 from fig2mesh.records import JOINT_NAMES, LIMBS, PART_NAMES, BoolArray, ByteArray, FloatArray
 
 INSIDE = 128
@@ -55,23 +56,30 @@ def begin(
 ) -> tuple[Subject, Annotation]:
     """A drawing and what is known of it, in IMAGE pixels of the part that is shown.
 
-    What no file says is a first guess: the silhouette from the alpha channel, a standing person for joints.
-    Raises FigureError as `fig2mesh.parse.read.read_figure` does.
+    What no file says is inferred from the picture; where no figure is seen in it, it is nothing for a silhouette, and a
+    standing person for joints. Raises FigureError as `fig2mesh.parse.read.read_figure` does.
     """
     view = read_view(path, bbox)
     height, width = view.rgba.shape[:2]
     if height * width > MOST_PIXELS:
         raise FigureError(path, f"{width}×{height} px is too much for a page", "pass --bbox round the figure")
-    transparent = bool((view.rgba[..., 3] < 128).any())
-    silhouette = read_mask(mask, view, path) if mask is not None or transparent else np.zeros((height, width), bool)
-    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, view)
     subject = Subject(path.stem, path.name, view.rgba, view.corner, view.size)
-    if keypoints is None:
-        joints, visible = standing(silhouette), np.ones(len(JOINT_NAMES), np.bool_)
-        return subject, Annotation(silhouette, joints, visible, labels)
-    given = read_keypoints(keypoints, path.name, bbox)
-    joints = given.points_px - np.array(view.corner, np.float32)
-    return subject, Annotation(silhouette, joints, given.visible, labels, given.depth_order)
+    silhouette = read_mask(mask, view)
+    labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, view)
+    given = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
+    if silhouette is None or given is None:
+        # torch takes seconds to load: only pictures without mask or joints pay for it.
+        from fig2mesh.parse.infer import infer_figure
+
+        usable = silhouette is None or bool(silhouette.any())
+        found = infer_figure(on_white(view.rgba), silhouette) if usable else None
+        if silhouette is None:
+            silhouette = np.zeros((height, width), np.bool_) if found is None else found.mask
+        if given is None and found is not None:
+            given = Joints(found.joints_px, found.visible)
+        elif given is None:
+            given = Joints(standing(silhouette), np.ones(len(JOINT_NAMES), np.bool_))
+    return subject, Annotation(silhouette, given.points_px, given.visible, labels, given.depth_order)
 
 
 def standing(mask: BoolArray) -> FloatArray:
@@ -85,17 +93,6 @@ def standing(mask: BoolArray) -> FloatArray:
         joints.append((middle + (-x if name.startswith("r_") else x) * height, top + y * height))
     limit = np.array([mask.shape[1], mask.shape[0]], np.float32)
     return np.clip(np.array(joints, np.float32), 0, limit)
-
-
-def on_whole_picture(subject: Subject, annotation: Annotation) -> Annotation:
-    """The annotation in pixels of the whole picture."""
-    (x, y), (width, height) = subject.corner, subject.size
-    rows, columns = annotation.mask.shape
-    mask, labels = np.zeros((height, width), np.bool_), np.zeros((height, width), np.uint8)
-    window = np.s_[y : y + rows, x : x + columns]
-    mask[window], labels[window] = annotation.mask, annotation.part_labels
-    joints = annotation.joints_px + np.array([x, y], np.float32)
-    return Annotation(mask, joints, annotation.visible, labels, annotation.depth_order)
 
 
 def packed(subject: Subject, annotation: Annotation) -> bytes:

@@ -8,11 +8,11 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from fig2mesh.annotate.editing import Subject, begin, on_whole_picture
+from fig2mesh.annotate.editing import Subject, begin
 from fig2mesh.annotate.server import annotation_server
 from fig2mesh.errors import FigureError, OutputError
 from fig2mesh.job import configure_logging
-from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, write_annotation
+from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, on_whole_picture, write_annotation
 from fig2mesh.settings import settings_for
 from fig2mesh.view.job import scene_of
 from fig2mesh.view.page import view_page
@@ -51,7 +51,8 @@ def run(
     subject, start = begin(figure, kept(mask, MASK), kept(keypoints, KEYPOINTS), kept(part_labels, PART_LABELS), bbox)
 
     def save(annotation: Annotation) -> str:
-        write_annotation(folder, on_whole_picture(subject, annotation), subject.picture, overwrite=True)
+        whole = on_whole_picture(annotation, subject.corner, subject.size)
+        write_annotation(folder, whole, subject.picture, overwrite=True)
         log.info("%s", main_job(figure, folder, bbox))
         return f"saved in {folder}"
 

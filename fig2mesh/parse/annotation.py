@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from PIL import Image, PngImagePlugin
 
 from exporters.write import write_whole
 from fig2mesh.parse.joint_writers import WRITERS
-from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, DepthOrder, Figure, FloatArray
+from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray, DepthOrder, Figure, FloatArray
 
 KEYPOINTS, MASK, PART_LABELS = "keypoints.json", "mask.png", "part_labels.png"
 """Names of the files in a folder of annotations; the main job's options of the same names read them."""
@@ -30,7 +30,7 @@ class Annotation:
     """What is known of a drawing; all in IMAGE pixels of the whole picture.
 
     mask : (H, W) bool; joints_px : (21, 2) float32; visible : (21,) bool; part_labels : (H, W) uint8, 0 outside of
-    the mask; depth_order : as in `Figure`
+    the mask; depth_order : as in `Figure`; confidence : (21,) 0-1 where the joints were inferred, else None
     """
 
     mask: BoolArray
@@ -38,6 +38,7 @@ class Annotation:
     visible: BoolArray
     part_labels: ByteArray
     depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
+    confidence: FloatArray | None = None
 
     def figure(self, name: str, rgba: ByteArray) -> Figure:
         """The figure that picture and annotation make."""
@@ -59,6 +60,9 @@ def write_annotation(
     joints = WRITERS[kind](annotation.joints_px, annotation.visible, (width, height), picture)
     if annotation.depth_order and kind == "fig2mesh":
         joints["depth_order"] = dict(annotation.depth_order)
+    if annotation.confidence is not None and kind == "fig2mesh":
+        rounded = [round(value, 3) for value in annotation.confidence.astype(float).tolist()]
+        joints["confidence"] = dict(zip(JOINT_NAMES, rounded, strict=True))
 
     def fill(stage: Path) -> None:
         (stage / KEYPOINTS).write_text(json.dumps(joints, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -70,3 +74,17 @@ def write_annotation(
         labels.save(stage / PART_LABELS, pnginfo=text, optimize=False)
 
     return write_whole(folder, folder / KEYPOINTS, fill, overwrite)
+
+
+def on_whole_picture(annotation: Annotation, corner: tuple[int, int], size: tuple[int, int]) -> Annotation:
+    """An annotation of a window in pixels of the whole picture.
+
+    corner : (x, y) of the window; size : (width, height) of the picture
+    """
+    (x, y), (width, height) = corner, size
+    rows, columns = annotation.mask.shape
+    mask, labels = np.zeros((height, width), np.bool_), np.zeros((height, width), np.uint8)
+    window = np.s_[y : y + rows, x : x + columns]
+    mask[window], labels[window] = annotation.mask, annotation.part_labels
+    joints = annotation.joints_px + np.array([x, y], np.float32)
+    return replace(annotation, mask=mask, joints_px=joints, part_labels=labels)

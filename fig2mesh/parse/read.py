@@ -1,64 +1,41 @@
-"""Read one drawn figure: the picture, its silhouette, joints and, where given, part labels."""
+"""Read one drawn figure: its files, and what none of them gives inferred from the picture."""
 
 from __future__ import annotations
 
-import warnings
+import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image, ImageOps, UnidentifiedImageError
 
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.keypoints import read_keypoints
-from fig2mesh.parse.window import is_large, read_window, size_of
-from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray, Figure
+from fig2mesh.parse.keypoints import Joints, read_keypoints
+from fig2mesh.parse.picture import View, on_white, read_labels, read_mask, read_view
+from fig2mesh.records import JOINT_NAMES, BoolArray, ByteArray, Figure, FloatArray
 
-MAX_PIXELS = 178_956_970
-"""Twice Pillow's warning level: decoding more would need gigabytes."""
+if TYPE_CHECKING:
+    from fig2mesh.parse.infer import Inference
 
-BAND_PX = 512
-"""Rows that are converted to RGBA at a time."""
+log = logging.getLogger("fig2mesh")
 
 JOINT_SLACK_PX = 1.0
 """Joints may lie on the picture's edge; rounding by annotation tools puts them up to a pixel outside."""
 
 
 @dataclass(frozen=True)
-class View:
-    """The part of a picture that holds the figure.
+class Reading:
+    """A figure as it was read, and what was inferred for it.
 
-    rgba : (H, W, 4) uint8; corner : (x, y) of its corner in the picture; size : (width, height) of the whole picture
+    figure : within its window of the picture; view : that window
+    part_labels : (H, W) uint8 of the window, those given, or inferred where that was asked for
+    confidence : (21,) 0-1 where joints were inferred, else None
     """
 
-    rgba: ByteArray
-    corner: tuple[int, int]
-    size: tuple[int, int]
-
-    @property
-    def window(self) -> tuple[slice, slice]:
-        """Its rows and columns in the whole picture."""
-        (x, y), (height, width) = self.corner, self.rgba.shape[:2]
-        return slice(y, y + height), slice(x, x + width)
-
-
-def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> View:
-    """The picture, or the part of it inside of `bbox`; of large ones no more than that is kept in memory.
-
-    Raises FigureError as `read_figure` does.
-    """
-    if bbox is None:
-        rgba = read_rgba(path)
-        return View(rgba, (0, 0), (rgba.shape[1], rgba.shape[0]))
-    if is_large(path):
-        pixels, size = read_window(path, bbox)
-        return View(pixels, bbox[:2], size)
-    rgba = read_rgba(path)
-    height, width = rgba.shape[:2]
-    x0, y0, x1, y1 = bbox
-    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
-        raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
-    return View(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
+    figure: Figure
+    view: View
+    part_labels: ByteArray
+    confidence: FloatArray | None
 
 
 def read_figure(
@@ -70,11 +47,11 @@ def read_figure(
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
 ) -> Figure:
-    """Read a figure from its files.
+    """Read a figure from its files; silhouette and joints that none of them gives are inferred from the picture.
 
     Parameters
     ----------
-    path : the picture; its alpha channel is the silhouette unless `mask` is given
+    path : the picture; its alpha channel, if it has one, is the silhouette unless `mask` is given
     mask : picture of the same size, or of the size of `bbox`; figure bright (≥ 128) on dark, or its alpha channel
     keypoints : joints, see `read_keypoints`
     part_labels : 8-bit single-channel picture of a size as for `mask` with the labels of `PART_NAMES`
@@ -83,133 +60,79 @@ def read_figure(
 
     Raises
     ------
-    FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture
+    FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, no figure is
+        found in the picture
     """
+    return read_parsed(path, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox, name=name).figure
+
+
+def read_parsed(
+    path: Path,
+    *,
+    mask: Path | None = None,
+    keypoints: Path | None = None,
+    part_labels: Path | None = None,
+    bbox: tuple[int, int, int, int] | None = None,
+    name: str | None = None,
+    labels: bool = False,
+) -> Reading:
+    """As `read_figure`, with what it was inferred from; labels : infer part labels where none are given."""
     view = read_view(path, bbox)
-    rgba, (width, height) = view.rgba, view.size
-    silhouette = read_mask(mask, view, path)
-    if keypoints is None:
-        raise FigureError(path, "no joints given", "pass --keypoints JSON with the 21 joints")
-    given = read_keypoints(keypoints, path.name, bbox)
-    if given.size is not None and given.size != (width, height):
-        raise FigureError(
-            keypoints,
-            f"made for a picture of {given.size[0]}×{given.size[1]} px, but {path.name} has {width}×{height}",
-            "pass the joints that belong to this picture",
-        )
-    joints = given.points_px - np.array(view.corner, np.float32)
-    labels = np.zeros(rgba.shape[:2], np.uint8) if part_labels is None else read_labels(part_labels, view)
-    height, width = rgba.shape[:2]
-    if not silhouette.any():
+    silhouette = read_mask(mask, view)
+    given = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
+    shape = view.rgba.shape[:2]
+    known = np.zeros(shape, np.uint8) if part_labels is None else read_labels(part_labels, view)
+    if silhouette is not None and not silhouette.any():
         where = mask if mask is not None else path
         raise FigureError(where, "the silhouette is empty", "the figure must be opaque, or bright in --mask")
-    low, high = -JOINT_SLACK_PX, np.array([width, height]) + JOINT_SLACK_PX
-    outside = ((joints < low) | (joints > high)).any(axis=1)
+    confidence, parts = None, known
+    if silhouette is None or given is None or (labels and part_labels is None):
+        found = _inferred(path, view.rgba, silhouette)
+        silhouette = found.mask if silhouette is None else silhouette
+        if given is None:
+            given, confidence = Joints(found.joints_px, found.visible), found.confidence
+        if part_labels is None:
+            parts = found.part_labels
+    size = np.array(shape[::-1], np.float32)
+    outside = ((given.points_px < -JOINT_SLACK_PX) | (given.points_px > size + JOINT_SLACK_PX)).any(axis=1)
     if outside.any():
         index = int(np.argmax(outside))
-        x, y = joints[index]
-        found = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {width}×{height} px"
-        raise FigureError(keypoints, found, "move it inside, or pass the joints that belong to this picture")
-    return Figure(
+        x, y = given.points_px[index]
+        said = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
+        where = keypoints if keypoints is not None else path
+        raise FigureError(where, said, "move it inside, or pass the joints that belong to this picture")
+    figure = Figure(
         name=name or path.stem,
-        rgba=rgba,
+        rgba=view.rgba,
         mask=silhouette,
-        joints_px=np.clip(joints, 0, [width, height]),
+        joints_px=np.clip(given.points_px, 0, size),
         visible=given.visible,
-        part_labels=np.where(silhouette, labels, 0),
+        part_labels=np.where(silhouette, known, 0),
         depth_order=given.depth_order,
         origin_px=(float(view.corner[0]), float(view.corner[1])),
     )
+    return Reading(figure, view, parts, confidence)
 
 
-def _open(path: Path, what: str) -> Image.Image:
-    """Open and decode a picture, or say in one line why not."""
-    try:
-        with warnings.catch_warnings():
-            # The limit below is ours and explicit; Pillow's warning would only repeat it.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path)
-            if image.width * image.height > MAX_PIXELS:
-                found = f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx"
-                raise FigureError(path, found, "pass --bbox X0 Y0 X1 Y1 round the figure")
-            image.load()
-            ImageOps.exif_transpose(image, in_place=True)
-            return image
-    except FigureError:
-        raise
-    except Image.DecompressionBombError:
-        raise FigureError(
-            path, f"more than {MAX_PIXELS / 1e6:.0f} Mpx", "pass --bbox X0 Y0 X1 Y1 round the figure"
-        ) from None
-    except UnidentifiedImageError:
-        raise FigureError(path, "not a picture that can be read", f"give a PNG, JPEG, TIFF or WebP as {what}") from None
-    except FileNotFoundError:
-        raise FigureError(path, "no such file", f"check the path of the {what}") from None
-    except Exception as error:
-        # Decoders raise whatever their format's parser raises; each of these means that the file is damaged.
-        reason = getattr(error, "strerror", None) or str(error).split("\n")[0][:100] or type(error).__name__
-        raise FigureError(path, f"cannot be read ({reason})", f"give an intact picture as {what}") from None
+def joints_of_view(path: Path, view: View, picture: Path, bbox: tuple[int, int, int, int] | None) -> Joints:
+    """The joints of a file, in IMAGE pixels of the view. Raises FigureError, also for those of another picture."""
+    given = read_keypoints(path, picture.name, bbox)
+    if given.size is not None and given.size != view.size:
+        made, has = (f"{width}×{height}" for width, height in (given.size, view.size))
+        found = f"made for a picture of {made} px, but {picture.name} has {has}"
+        raise FigureError(path, found, "pass the joints that belong to this picture")
+    points = given.points_px - np.array(view.corner, np.float32)
+    return Joints(points, given.visible, given.size, given.depth_order)
 
 
-def read_rgba(path: Path) -> ByteArray:
-    """(H, W, 4) uint8 of a picture of any mode, upright. Raises FigureError."""
-    image = _open(path, "figure")
-    if image.mode.startswith(("I", "F")):
-        # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
-        values = np.asarray(image, np.float64)
-        top = 65535.0 if values.max() > 255 else 255.0
-        image = Image.fromarray(np.clip(values / top * 255.0, 0, 255).astype(np.uint8))
-    # In bands, as Pillow would keep two more copies of the whole picture meanwhile.
-    width, height = image.size
-    rgba = np.empty((height, width, 4), np.uint8)
-    for top in range(0, height, BAND_PX):
-        bottom = min(top + BAND_PX, height)
-        rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
-    return rgba
+def _inferred(path: Path, rgba: ByteArray, silhouette: BoolArray | None) -> Inference:
+    """What the figure parser finds in a picture; what it doubts is said."""
+    # torch takes seconds to load: only pictures without mask or joints pay for it.
+    from fig2mesh.parse.infer import REMEDY, infer_figure
 
-
-def read_mask(path: Path | None, view: View, figure: Path) -> BoolArray:
-    """(H, W) bool silhouette from a file, or from the figure's alpha where there is none. Raises FigureError."""
-    if path is None:
-        if (view.rgba[..., 3] >= 128).all():
-            found = "no silhouette: the picture has no transparent background"
-            raise FigureError(figure, found, "pass --mask PNG, or a picture with an alpha channel")
-        return view.rgba[..., 3] >= 128
-    values = _of_view(path, view)
-    if values is None:
-        values = read_rgba(path)
-        if values.shape != view.rgba.shape:
-            width, height = view.size
-            found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
-            raise FigureError(path, found, "pass a mask of the figure's size")
-    if (values[..., 3] < 255).any():
-        return values[..., 3] >= 128
-    grey = values[..., :3].max(axis=2)
-    # Masks also come as 0/1 pictures.
-    return np.asarray(grey >= (128 if grey.max() > 1 else 1))
-
-
-def _of_view(path: Path, view: View) -> ByteArray | None:
-    """The view's part of a picture beside the figure's; None where that picture is not as large as the figure's."""
-    if is_large(path):
-        (x, y), (height, width) = view.corner, view.rgba.shape[:2]
-        whole = size_of(path) == view.size
-        return read_window(path, (x, y, x + width, y + height))[0] if whole else None
-    values = read_rgba(path)
-    return values[view.window] if values.shape[:2] == view.size[::-1] else None
-
-
-def read_labels(path: Path, view: View) -> ByteArray:
-    """(H, W) uint8 part labels from a file. Raises FigureError."""
-    image = _open(path, "part labels")
-    if image.mode not in ("L", "P"):
-        raise FigureError(path, f"mode {image.mode}", "give an 8-bit single-channel or palette picture of labels")
-    labels = np.asarray(image, np.uint8)
-    if labels.shape == view.size[::-1]:
-        labels = labels[view.window]
-    if labels.shape != view.rgba.shape[:2]:
-        found = f"{labels.shape[1]}×{labels.shape[0]} px, but the figure has {view.size[0]}×{view.size[1]}"
-        raise FigureError(path, found, "pass part labels of the figure's size")
-    if labels.max() >= len(PART_NAMES):
-        raise FigureError(path, f"label {labels.max()}", f"use 0 to {len(PART_NAMES) - 1}")
-    return labels
+    found = infer_figure(on_white(rgba), silhouette)
+    if found is None:
+        raise FigureError(path, "no figure is found in it", "pass --bbox round the figure, or --mask and --keypoints")
+    if found.doubts:
+        log.warning("%s: %s; %s", path, "; ".join(found.doubts), REMEDY)
+    return found

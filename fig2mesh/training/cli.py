@@ -19,7 +19,16 @@ KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
 """Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
 
-BUDGET_MIN = {"pose": 60.0, "size": 3.0, "parts": 45.0, "uv": 40.0, "fill": 40.0, "refine": 40.0, "head": 20.0}
+BUDGET_MIN = {
+    "pose": 60.0,
+    "size": 3.0,
+    "parts": 45.0,
+    "uv": 40.0,
+    "fill": 40.0,
+    "refine": 40.0,
+    "head": 20.0,
+    "parse": 240.0,
+}
 """Minutes a network where neither --budget nor --epochs is given: hours for everything on two cores."""
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -189,6 +198,32 @@ def head(data: Path, out: Path, budget: float | None, epochs: int | None, device
     _check_cpu(device)
     steps = None if epochs is None else 1000 * epochs
     _say(train_head(data, fill, out, budget_min=_minutes("head", budget, epochs), steps=steps, seed=seed))
+
+
+@train.command()
+@common("Folder of crops.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=1e-3, show_default=True, help="Learning rate.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
+@click.option(
+    "--blazepose",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="TFLITE",
+    help="Start the encoder from pose_landmark_full.tflite; docs/parsing.md says where it is from.",
+)
+@click.option("--whole", is_flag=True, help="Train the encoder's first stages too.")
+def parse(
+    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, lr: float,
+    init: Path | None, blazepose: Path | None, whole: bool,
+) -> None:  # fmt: skip
+    """Silhouette, parts and joints from a bare picture."""
+    from fig2mesh.training.train_parse import train_parse
+
+    _check_cpu(device)
+    _say(train_parse(
+        data, out, budget_min=_minutes("parse", budget, epochs), steps=None if epochs is None else 1000 * epochs,
+        seed=seed, rate=lr, init=init, blazepose=blazepose, whole=whole,
+    ))  # fmt: skip
 
 
 def add_to(cli: click.Group) -> None:

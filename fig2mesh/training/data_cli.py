@@ -65,6 +65,30 @@ def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, shapes
 
 
 @data.command()
+@click.option("--pack", type=FILE, required=True, metavar="FILE", help="What `data pack` made.")
+@click.option(
+    "-o", "--output", "out", type=FOLDER, required=True, metavar="DIR", help="Of shards; goes on with what is there."
+)
+@click.option(
+    "--bodies", type=click.IntRange(1), default=2000, show_default=True, metavar="N", help="Four drawings each."
+)
+@click.option(
+    "--doodles", type=click.IntRange(1), default=3200, show_default=True, metavar="N", help="Lines and blobs."
+)
+@click.option("--valid", type=click.IntRange(1), default=40, show_default=True, metavar="N", help="Held-out bodies.")
+@click.option("--seed", type=click.IntRange(0, 2000), default=0, show_default=True)
+@click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, metavar="N")
+def crops(pack: Path, out: Path, bodies: int, doodles: int, valid: int, seed: int, jobs: int) -> None:
+    """Drawn figures with labels and joints for the figure parser."""
+    from fig2mesh.training.crop_data import build_crops
+
+    build_crops(
+        pack, out, bodies=bodies, doodles=doodles, valid=valid, seed=seed, jobs=jobs,
+        report=lambda done, total: click.echo(f"{done} of {total} shards", err=True),
+    )  # fmt: skip
+
+
+@data.command()
 @click.argument("source", type=click.Path(path_type=Path), metavar="DATA")
 @click.option("-o", "--output", "out", type=FILE, required=True, metavar="PNG")
 @click.option("--count", type=click.IntRange(1, 200), default=24, show_default=True, metavar="N", help="Bodies shown.")

@@ -42,8 +42,8 @@ def draw_views(subject: Subject, rng: np.random.Generator) -> dict[str, NDArray[
     out: dict[str, list[NDArray[Any]]] = {"picture": [], "labels": [], "depth": [], "uv": []}
     for view in range(4):
         raster, labels, corner, pitch = scene(subject, view, SIZE * SHRINK)
-        layers, uv = _layers(subject, view, raster, labels)
-        face = _face(subject.joints @ VIEWS[view].T, corner, pitch)
+        layers, uv = view_layers(subject, view, raster, labels)
+        face = view_face(subject.joints @ VIEWS[view].T, corner, pitch)
         out["picture"].append(draw(layers, materials, rng, style=style, face=face, shrink=SHRINK, paper=paper))
         middle = np.s_[SHRINK // 2 :: SHRINK, SHRINK // 2 :: SHRINK]
         out["labels"].append(labels[middle])
@@ -52,7 +52,7 @@ def draw_views(subject: Subject, rng: np.random.Generator) -> dict[str, NDArray[
     return {name: np.stack(images) for name, images in out.items()}
 
 
-def _layers(
+def view_layers(
     subject: Subject, view: int, raster: Raster, labels: NDArray[np.uint8]
 ) -> tuple[Layers, NDArray[np.float32]]:
     """What the draughtsman sees, and the texture coordinates; bodies without any are patterned by their rest pose."""
@@ -81,8 +81,10 @@ def _corner_blend(raster: Raster, corners: NDArray[np.float32]) -> NDArray[np.fl
     return out
 
 
-def _face(joints: NDArray[np.float64], corner: NDArray[np.float64], pitch: float) -> Face | None:
-    """Eyes and mouth in pixels of the picture; None where the face looks away."""
+def view_face(
+    joints: NDArray[np.float64], corner: NDArray[np.float64], pitch: float, size: int = SIZE * SHRINK
+) -> Face | None:
+    """Eyes and mouth in pixels of a picture of `size` pixels a side; None where the face looks away."""
     head, eyes, neck = (joints[JOINT[name]] for name in ("head", "eyes", "neck"))
     forward = eyes - head
     reach = float(np.linalg.norm(forward))
@@ -93,7 +95,6 @@ def _face(joints: NDArray[np.float64], corner: NDArray[np.float64], pitch: float
     up = up - forward * (up @ forward)
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     across = np.cross(up, forward)
-    size = SIZE * SHRINK
 
     def pixel(point: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.array([(point[0] - corner[0]) / pitch, size - (point[1] - corner[1]) / pitch])

@@ -70,17 +70,15 @@ def broken(files: DrawnFiles, folder: Path, case: str) -> dict[str, Path | None]
         arguments["path"].write_bytes(files.image.read_bytes()[:900])
     elif case == "folder":
         arguments["path"] = folder
-    elif case == "opaque":
-        arguments["path"] = folder / "opaque.png"
-        draw_figure().convert("RGB").save(arguments["path"])
+    elif case == "blank":
+        arguments["path"] = folder / "blank.png"
+        Image.new("RGB", (400, 600), "white").save(arguments["path"])
     elif case == "mask size":
         arguments["mask"] = folder / "small.png"
         Image.open(files.mask).resize((50, 50)).save(arguments["mask"])
     elif case == "empty mask":
         arguments["mask"] = folder / "empty.png"
         Image.new("L", (400, 600)).save(arguments["mask"])
-    elif case == "no joints":
-        arguments["keypoints"] = None
     elif case == "not json":
         files.keypoints.write_text("{")
     elif case == "nested":
@@ -113,10 +111,9 @@ CASES = {
     "text": "not a picture",
     "truncated": "cannot be read",
     "folder": "cannot be read",
-    "opaque": "no silhouette",
+    "blank": "no figure is found in it; pass --bbox",
     "mask size": "50×50 px, but the figure has 400×600",
     "empty mask": "silhouette is empty",
-    "no joints": "--keypoints",
     "not json": "not JSON",
     "nested": "nested too deeply",
     "list": "keypoints",

@@ -36,10 +36,10 @@ def test_pictures_of_sixteen_pixels(job: Job, worst: Worst, width: int, height: 
 @hard_case(
     "a picture of one opaque pixel, without --mask",
     "one line, exit code 2, nothing written",
-    "a picture without background shows no silhouette",
+    "there is nothing to be seen on it",
 )
 def test_a_picture_of_one_pixel(job: Job) -> None:
-    refused(job(np.full((1, 1, 4), 255, np.uint8)), "no silhouette")
+    refused(job(np.full((1, 1, 4), 255, np.uint8)), "no figure is found")
 
 
 BARS = [(4000, 20), (20, 4000), (3000, 2)]

@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from fig2mesh.annotate.editing import STANDING, Subject, begin, on_whole_picture, packed, standing, unpacked
+from fig2mesh.annotate.editing import STANDING, Subject, begin, packed, standing, unpacked
 from fig2mesh.annotate.job import main_job
 from fig2mesh.annotate.server import HEADER, annotation_server
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.parse.annotation import COLOURS, Annotation, write_annotation
+from fig2mesh.parse.annotation import COLOURS, Annotation, on_whole_picture, write_annotation
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import JOINT, JOINT_NAMES, PART_NAMES
 from tests.browser import serving
@@ -94,7 +94,7 @@ def test_a_window_is_edited_in_its_own_pixels_and_saved_in_the_picture_s(files: 
     subject, part = begin(files.image, files.mask, files.keypoints, None, box)
     assert subject.rgba.shape[:2] == (584, 386)
     assert subject.size == whole.size == (400, 600)
-    restored = on_whole_picture(subject, part)
+    restored = on_whole_picture(part, subject.corner, subject.size)
     np.testing.assert_allclose(restored.joints_px, all_of_it.joints_px)
     assert np.array_equal(restored.mask[6:590, 10:396], all_of_it.mask[6:590, 10:396])
     assert restored.mask.sum() == part.mask.sum()

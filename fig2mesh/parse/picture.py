@@ -1,0 +1,159 @@
+"""Pictures of figures: decoded, cut to their window, with the masks and part labels that belong to them."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+from fig2mesh.errors import FigureError
+from fig2mesh.parse.window import is_large, read_window, size_of
+from fig2mesh.records import PART_NAMES, BoolArray, ByteArray
+
+MAX_PIXELS = 178_956_970
+"""Twice Pillow's warning level: decoding more would need gigabytes."""
+
+BAND_PX = 512
+"""Rows that are converted to RGBA at a time."""
+
+
+@dataclass(frozen=True)
+class View:
+    """The part of a picture that holds the figure.
+
+    rgba : (H, W, 4) uint8; corner : (x, y) of its corner in the picture; size : (width, height) of the whole picture
+    """
+
+    rgba: ByteArray
+    corner: tuple[int, int]
+    size: tuple[int, int]
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Its rows and columns in the whole picture."""
+        (x, y), (height, width) = self.corner, self.rgba.shape[:2]
+        return slice(y, y + height), slice(x, x + width)
+
+
+def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> View:
+    """The picture, or the part of it inside of `bbox`; of large ones no more than that is kept in memory.
+
+    Raises FigureError as `read_figure` does.
+    """
+    if bbox is None:
+        rgba = read_rgba(path)
+        return View(rgba, (0, 0), (rgba.shape[1], rgba.shape[0]))
+    if is_large(path):
+        pixels, size = read_window(path, bbox)
+        return View(pixels, bbox[:2], size)
+    rgba = read_rgba(path)
+    height, width = rgba.shape[:2]
+    x0, y0, x1, y1 = bbox
+    if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
+        raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
+    return View(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
+
+
+def _open(path: Path, what: str) -> Image.Image:
+    """Open and decode a picture, or say in one line why not."""
+    try:
+        with warnings.catch_warnings():
+            # The limit below is ours and explicit; Pillow's warning would only repeat it.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            image = Image.open(path)
+            if image.width * image.height > MAX_PIXELS:
+                found = f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx"
+                raise FigureError(path, found, "pass --bbox X0 Y0 X1 Y1 round the figure")
+            image.load()
+            ImageOps.exif_transpose(image, in_place=True)
+            return image
+    except FigureError:
+        raise
+    except Image.DecompressionBombError:
+        raise FigureError(
+            path, f"more than {MAX_PIXELS / 1e6:.0f} Mpx", "pass --bbox X0 Y0 X1 Y1 round the figure"
+        ) from None
+    except UnidentifiedImageError:
+        raise FigureError(path, "not a picture that can be read", f"give a PNG, JPEG, TIFF or WebP as {what}") from None
+    except FileNotFoundError:
+        raise FigureError(path, "no such file", f"check the path of the {what}") from None
+    except Exception as error:
+        # Decoders raise whatever their format's parser raises; each of these means that the file is damaged.
+        reason = getattr(error, "strerror", None) or str(error).split("\n")[0][:100] or type(error).__name__
+        raise FigureError(path, f"cannot be read ({reason})", f"give an intact picture as {what}") from None
+
+
+def read_rgba(path: Path) -> ByteArray:
+    """(H, W, 4) uint8 of a picture of any mode, upright. Raises FigureError."""
+    image = _open(path, "figure")
+    if image.mode.startswith(("I", "F")):
+        # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
+        values = np.asarray(image, np.float64)
+        top = 65535.0 if values.max() > 255 else 255.0
+        image = Image.fromarray(np.clip(values / top * 255.0, 0, 255).astype(np.uint8))
+    # In bands, as Pillow would keep two more copies of the whole picture meanwhile.
+    width, height = image.size
+    rgba = np.empty((height, width, 4), np.uint8)
+    for top in range(0, height, BAND_PX):
+        bottom = min(top + BAND_PX, height)
+        rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
+    return rgba
+
+
+def read_mask(path: Path | None, view: View) -> BoolArray | None:
+    """(H, W) bool silhouette from a file, or from the figure's alpha where there is none; None where there is neither.
+
+    Raises FigureError.
+    """
+    if path is None:
+        opaque = view.rgba[..., 3] >= 128
+        return None if opaque.all() else np.asarray(opaque)
+    values = _of_view(path, view)
+    if values is None:
+        values = read_rgba(path)
+        if values.shape != view.rgba.shape:
+            width, height = view.size
+            found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
+            raise FigureError(path, found, "pass a mask of the figure's size")
+    if (values[..., 3] < 255).any():
+        return values[..., 3] >= 128
+    grey = values[..., :3].max(axis=2)
+    # Masks also come as 0/1 pictures.
+    return np.asarray(grey >= (128 if grey.max() > 1 else 1))
+
+
+def _of_view(path: Path, view: View) -> ByteArray | None:
+    """The view's part of a picture beside the figure's; None where that picture is not as large as the figure's."""
+    if is_large(path):
+        (x, y), (height, width) = view.corner, view.rgba.shape[:2]
+        whole = size_of(path) == view.size
+        return read_window(path, (x, y, x + width, y + height))[0] if whole else None
+    values = read_rgba(path)
+    return values[view.window] if values.shape[:2] == view.size[::-1] else None
+
+
+def read_labels(path: Path, view: View) -> ByteArray:
+    """(H, W) uint8 part labels from a file. Raises FigureError."""
+    image = _open(path, "part labels")
+    if image.mode not in ("L", "P"):
+        raise FigureError(path, f"mode {image.mode}", "give an 8-bit single-channel or palette picture of labels")
+    labels = np.asarray(image, np.uint8)
+    if labels.shape == view.size[::-1]:
+        labels = labels[view.window]
+    if labels.shape != view.rgba.shape[:2]:
+        found = f"{labels.shape[1]}×{labels.shape[0]} px, but the figure has {view.size[0]}×{view.size[1]}"
+        raise FigureError(path, found, "pass part labels of the figure's size")
+    if labels.max() >= len(PART_NAMES):
+        raise FigureError(path, f"label {labels.max()}", f"use 0 to {len(PART_NAMES) - 1}")
+    return labels
+
+
+def on_white(rgba: ByteArray) -> ByteArray:
+    """(H, W, 3) the picture as a viewer shows it on white paper."""
+    if (rgba[..., 3] == 255).all():
+        return np.ascontiguousarray(rgba[..., :3])
+    alpha = rgba[..., 3:].astype(np.float32) / 255
+    return np.rint(rgba[..., :3] * alpha + 255 * (1 - alpha)).astype(np.uint8)

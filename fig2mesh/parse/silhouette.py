@@ -1,0 +1,302 @@
+"""A crisp silhouette from a coarse one: what the picture's own lines and colours say of a network's guess.
+
+Colours of what is surely figure and surely ground decide near the guessed outline, smoothed along the picture's edges
+by a guided filter (He, Sun, Tang 2013). On plain grounds (paper, one colour, soft gradients) lines know better: all
+that can be reached from the rim without crossing one is ground. Where the two differ, the guess decides piece by piece.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from fig2mesh.records import BoolArray, ByteArray, FloatArray
+
+WORKING: Final = 800
+"""Pixels of the longer side at which the outline is sought; larger pictures are reduced for it."""
+
+PLAIN_SHARE: Final = 0.7
+"""A ground is plain where this share of what the network calls ground has the colour of a smooth sheet."""
+
+FAINT: Final = 10.0
+"""Colours nearer to the ground's than this are the ground's, 0-255."""
+
+ROUGH: Final = 7.0
+"""Grain of paper beyond which a ground is not plain, 0-255."""
+
+AGREED: Final = 0.72
+"""IoU with the guess from which an outline that lines have is believed."""
+
+BESIDE: Final = 0.3
+LOST: Final = 0.8
+"""Pieces that lines enclose and colours do not are left out below the one likelihood; those that colours find and
+lines do not are taken in above the other."""
+
+BLUR: Final = 3
+"""Width of the rim that scans blur, pixels."""
+
+GAPS: Final = (0, 1, 2, 4, 7, 11)
+"""Half widths of gaps in the drawn outline that are bridged, pixels of the working size."""
+
+BINS: Final = 12
+"""Cells an axis of the colour histograms."""
+
+
+class Sheet(NamedTuple):
+    """away : (H, W) float32, how far a pixel's colour is from the plain ground's, 0-255; noise : its spread there
+    share : of the ground that has the sheet's colour"""
+
+    away: FloatArray
+    noise: float
+    share: float
+
+
+def refine(rgb: ByteArray, likely: FloatArray) -> BoolArray:
+    """(H, W) bool silhouette.
+
+    rgb : (H, W, 3) uint8; likely : (H, W) float32, how likely a network holds each pixel for the figure, 0-1
+    """
+    height, width = likely.shape
+    step = max(1, int(np.ceil(max(height, width) / WORKING)))
+    small, guess = _reduced(rgb.astype(np.float32), step), _reduced(likely[..., None], step)[..., 0]
+    found = _outline(small, guess)
+    if step == 1:
+        return found
+    scale = (height / found.shape[0], width / found.shape[1])
+    soft = ndimage.zoom(found.astype(np.float32), scale, order=1, grid_mode=True, mode="nearest")
+    return np.asarray(soft[:height, :width] > 0.5)
+
+
+def _outline(rgb: FloatArray, likely: FloatArray) -> BoolArray:
+    guess = likely > 0.5
+    if not guess.any():
+        return guess
+    coloured = by_colour(rgb, likely)
+    sheet = plain_sheet(rgb, likely)
+    if sheet is None or sheet.share < PLAIN_SHARE:
+        return coloured
+    enclosed, score = _enclosed(sheet, likely)
+    return _merged(enclosed, coloured, likely) if score >= AGREED else coloured
+
+
+def _merged(enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
+    """What lines enclose, without what stands or lies beside the figure, and with what a gap in its outline lost."""
+    beside = _pieces(enclosed & ~coloured, likely, below=BESIDE)
+    lost = _pieces(coloured & ~enclosed, likely, above=LOST)
+    return (enclosed & ~beside) | lost
+
+
+def _pieces(mask: BoolArray, likely: FloatArray, below: float = 2.0, above: float = -1.0) -> BoolArray:
+    """The connected pieces of a mask whose mean likelihood lies between."""
+    regions, count = ndimage.label(mask, np.ones((3, 3)))
+    if not count:
+        return np.zeros_like(mask)
+    index = np.arange(1, count + 1)
+    mean = ndimage.mean(likely, regions, index)
+    return np.asarray(np.isin(regions, index[(mean < below) & (mean > above)]))
+
+
+def plain_sheet(rgb: FloatArray, likely: FloatArray) -> Sheet | None:
+    """The ground as a smooth sheet (a quadratic in x and y); None where there is too little of it."""
+    ground = likely < 0.25
+    height, width = likely.shape
+    rim = np.zeros_like(ground)
+    reach = max(2, min(height, width) // 60)
+    rim[:reach] = rim[-reach:] = rim[:, :reach] = rim[:, -reach:] = True
+    rows = np.flatnonzero((ground & (rim | (likely < 0.08))).ravel())
+    if len(rows) < 60:
+        return None
+    rows = rows[:: max(1, len(rows) // 6000)]
+    y, x = np.divmod(rows, width)
+    x, y = x / width - 0.5, y / height - 0.5
+    base = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+    colours = rgb.reshape(-1, 3)[rows].astype(np.float64)
+    # From the commonest colour outwards: lines and scenery are left out step by step.
+    middle = _mode(colours)
+    kept = np.abs(colours - middle).max(axis=1) < 40
+    terms = 1
+    for terms in (1, 3, 6, 6):
+        if kept.sum() < 40:
+            return None
+        fit, *_ = np.linalg.lstsq(base[kept, :terms], colours[kept], rcond=None)
+        rest = np.abs(colours - base[:, :terms] @ fit).max(axis=1)
+        noise = float(np.clip(1.5 * np.median(rest[kept]), 1.0, ROUGH))
+        kept = rest < max(4 * noise, 9)
+    grid_y, grid_x = np.mgrid[:height, :width]
+    gx, gy = (grid_x / width - 0.5).ravel(), (grid_y / height - 0.5).ravel()
+    full = np.stack([np.ones_like(gx), gx, gy, gx * gx, gx * gy, gy * gy], axis=1)[:, :terms] @ fit
+    away = np.abs(rgb - full.reshape(height, width, 3)).max(axis=2).astype(np.float32)
+    share = float((away < max(4 * noise, 12))[ground].mean()) if ground.any() else 0.0
+    return Sheet(away, noise, share)
+
+
+def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
+    cells = (colours // 16).astype(int)
+    flat = cells[:, 0] * 256 + cells[:, 1] * 16 + cells[:, 2]
+    values, counts = np.unique(flat, return_counts=True)
+    return np.median(colours[flat == values[counts.argmax()]], axis=0)
+
+
+def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
+    """What lines or colours enclose, for the gap width whose result agrees best with the guess; and how well."""
+    line = sheet.away > max(5 * sheet.noise, FAINT)
+    best, top = likely > 0.5, -1.0
+    for gap in GAPS:
+        found = _flooded(line, likely, gap)
+        found = _half_way(found, sheet.away)
+        score = agreement(found, likely)
+        # Wider bridges round off corners: they must earn it.
+        if score > top + (0.01 if gap else 0):
+            best, top = found, score
+    return best, top
+
+
+def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
+    """The figure: all that is not ground, where ground reaches the rim through gaps wider than 2 `gap`."""
+    barrier = _grown(line, gap)
+    free = ~np.pad(barrier, 1)
+    # A figure cut off by the rim is no way in for the ground.
+    free[0, 1:-1] = free[-1, 1:-1] = free[1:-1, 0] = free[1:-1, -1] = True
+    rim_figure = np.pad(likely > 0.6, 1, mode="edge")
+    inner = np.zeros_like(free)
+    inner[1:-1, 1:-1] = True
+    free &= inner | ~rim_figure
+    regions, _count = ndimage.label(free)
+    outside = regions == regions[0, 0] if free[0, 0] else np.zeros_like(free)
+    rim_regions = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
+    outside |= np.isin(regions, rim_regions[rim_regions > 0])
+    outside = outside[1:-1, 1:-1]
+    if gap:
+        # Back to the lines, round corners too; through a gap only a little way.
+        outside = ndimage.binary_dilation(outside, np.ones((3, 3)), iterations=gap + 1, mask=~line)
+    figure = ~outside
+    figure = _without_others(figure, likely)
+    return _without_holes(figure, line, likely)
+
+
+def _half_way(figure: BoolArray, away: FloatArray) -> BoolArray:
+    """The figure without the paler half of its blurred rim: an edge is where a line has half of its strength."""
+    soft = away < 0.5 * ndimage.maximum_filter(away, 2 * BLUR + 1)
+    outside = ndimage.binary_dilation(~figure, iterations=BLUR, mask=soft | ~figure)
+    return np.asarray(~outside)
+
+
+def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:
+    """Without pieces that the network does not hold for the figure, and without what sticks out far from it."""
+    reach = max(3, round(0.045 * max(figure.shape)))
+    away = ndimage.distance_transform_edt(likely < 0.3)
+    figure = figure & ((away < reach) | (likely > 0.06))
+    regions, count = ndimage.label(figure, np.ones((3, 3)))
+    if not count:
+        return figure
+    index = np.arange(1, count + 1)
+    size, mean = ndimage.sum_labels(figure, regions, index), ndimage.mean(likely, regions, index)
+    keep = (mean > 0.3) & (size > 2e-4 * figure.size)
+    if not keep.any():
+        keep[np.argmax(size * mean)] = True
+    return np.asarray(np.isin(regions, index[keep]))
+
+
+def _without_holes(figure: BoolArray, line: BoolArray, likely: FloatArray) -> BoolArray:
+    """With holes where the ground is seen through the figure: enclosed, of the ground's colour, unlikely."""
+    regions, count = ndimage.label(figure & ~line)
+    if not count:
+        return figure
+    index = np.arange(1, count + 1)
+    size, mean = ndimage.sum_labels(figure, regions, index), ndimage.mean(likely, regions, index)
+    holes = index[(mean < 0.4) & (size > 3e-4 * figure.size)]
+    return figure & ~np.isin(regions, holes) if len(holes) else figure
+
+
+def agreement(mask: BoolArray, likely: FloatArray) -> float:
+    """IoU of a mask with a guess, where pixels of which the guess is unsure count less."""
+    sure = np.abs(2 * likely - 1)
+    guess = likely > 0.5
+    either = float((sure * (mask | guess)).sum())
+    return float((sure * (mask & guess)).sum()) / either if either else 0.0
+
+
+def by_colour(rgb: FloatArray, likely: FloatArray) -> BoolArray:
+    """The guess, corrected near its outline by the colours of figure and ground and the picture's edges."""
+    inside, outside = np.clip((likely - 0.6) / 0.4, 0, 1), np.clip((0.4 - likely) / 0.4, 0, 1)
+    cells = (np.clip(rgb, 0, 255) * (BINS / 256)).astype(int)
+    flat = (cells[..., 0] * BINS + cells[..., 1]) * BINS + cells[..., 2]
+    shares = []
+    for weight in (inside, outside):
+        count = np.bincount(flat.ravel(), weight.ravel(), BINS**3).reshape(BINS, BINS, BINS)
+        smooth = ndimage.gaussian_filter(count, 0.7)
+        shares.append(smooth / max(smooth.sum(), 1e-9) + 2e-5)
+    colour = np.log(shares[0] / shares[1]).ravel()[flat]
+    prior = np.log(np.clip(likely, 0.01, 0.99) / np.clip(1 - likely, 0.01, 0.99))
+    both = 1 / (1 + np.exp(-(prior + 0.45 * np.clip(colour, -3, 3))))
+    side = max(likely.shape)
+    smooth = guided(rgb / 255, both.astype(np.float32), max(2, side // 90), 2e-3)
+    mask = (smooth > 0.5) & (likely > 0.04)
+    return _tidy(mask, likely)
+
+
+def _tidy(mask: BoolArray, likely: FloatArray) -> BoolArray:
+    regions, count = ndimage.label(mask)
+    if not count:
+        return likely > 0.5
+    index = np.arange(1, count + 1)
+    size, mean = ndimage.sum_labels(mask, regions, index), ndimage.mean(likely, regions, index)
+    mask = np.isin(regions, index[(size > 0.01 * mask.sum()) & (mean > 0.4)]) if count > 1 else mask
+    holes, count = ndimage.label(~mask)
+    if not count:
+        return np.asarray(mask)
+    index = np.arange(1, count + 1)
+    size, mean = ndimage.sum_labels(~mask, holes, index), ndimage.mean(likely, holes, index)
+    fill = index[(mean > 0.45) | (size < 1e-4 * mask.size)]
+    return np.asarray(mask | np.isin(holes, fill))
+
+
+def guided(guide: FloatArray, values: FloatArray, radius: int, softness: float) -> FloatArray:
+    """Guided filter: `values` (H, W) smoothed so that it follows the edges of `guide` (H, W, 3), both 0-1.
+
+    Each window's values are a linear function of its colours (He, Sun, Tang 2013, equation 19).
+    """
+
+    def mean(field: NDArray[Any]) -> NDArray[np.float64]:
+        return np.asarray(ndimage.uniform_filter(field, (2 * radius + 1,) * 2, mode="nearest"), np.float64)
+
+    channels = [guide[..., i].astype(np.float64) for i in range(3)]
+    means = [mean(channel) for channel in channels]
+    middle = mean(values)
+    r, g, b = (mean(c * values) - m * middle for c, m in zip(channels, means, strict=True))
+    s = {
+        (i, j): mean(channels[i] * channels[j]) - means[i] * means[j] + (softness if i == j else 0.0)
+        for i in range(3)
+        for j in range(i, 3)
+    }
+    # The inverse of a symmetric 3 × 3 matrix by cofactors.
+    c00, c01 = s[1, 1] * s[2, 2] - s[1, 2] ** 2, s[0, 2] * s[1, 2] - s[0, 1] * s[2, 2]
+    c02, c11 = s[0, 1] * s[1, 2] - s[0, 2] * s[1, 1], s[0, 0] * s[2, 2] - s[0, 2] ** 2
+    c12, c22 = s[0, 1] * s[0, 2] - s[0, 0] * s[1, 2], s[0, 0] * s[1, 1] - s[0, 1] ** 2
+    scale = 1 / (s[0, 0] * c00 + s[0, 1] * c01 + s[0, 2] * c02)
+    slope = (
+        (c00 * r + c01 * g + c02 * b) * scale,
+        (c01 * r + c11 * g + c12 * b) * scale,
+        (c02 * r + c12 * g + c22 * b) * scale,
+    )
+    shift = middle - sum(a * m for a, m in zip(slope, means, strict=True))
+    out = mean(shift) + sum(mean(a) * c for a, c in zip(slope, channels, strict=True))
+    return np.asarray(out, np.float32)
+
+
+def _grown(mask: BoolArray, radius: int) -> BoolArray:
+    if radius == 0:
+        return mask
+    return np.asarray(ndimage.distance_transform_edt(~mask) <= radius) if mask.any() else mask
+
+
+def _reduced(picture: FloatArray, step: int) -> FloatArray:
+    """Means of step × step pixels."""
+    if step == 1:
+        return picture
+    height, width = (length // step * step for length in picture.shape[:2])
+    cut = picture[:height, :width]
+    return np.asarray(cut.reshape(height // step, step, width // step, step, -1).mean(axis=(1, 3)), np.float32)

@@ -1,0 +1,97 @@
+"""Figures from bare pictures, by the shipped network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from fig2mesh.evaluate_parse import GROUNDS, bare, drawings, evaluate_parse, measure
+from fig2mesh.parse.infer import infer_figure, look, spread, square
+from fig2mesh.parse.read import read_picture
+from fig2mesh.parts.kinds import JOINT_MIRROR
+from fig2mesh.records import JOINT, PART
+
+FARMER = Path(__file__).parents[3] / "examples" / "figures" / "farmer"
+
+
+@pytest.fixture(scope="module")
+def farmer() -> np.ndarray:
+    return bare(read_picture(FARMER / "image.png"), "white")
+
+
+@pytest.mark.parametrize("ground", GROUNDS)
+def test_the_farmer_is_found_on_any_ground(ground: str) -> None:
+    score, found = measure(FARMER, ground)
+    assert found is not None
+    # Measured 2026-11-28: docs/parsing.md.
+    assert score.iou > 0.9
+    assert score.pck10 > 0.8
+
+
+def test_a_mirrored_picture_has_the_mirrored_answer(farmer: np.ndarray) -> None:
+    size = farmer.shape[1], farmer.shape[0]
+    centre, edge = np.array(size) / 2, 1.1 * max(size)
+    seen, turned = look(farmer, centre, edge), look(farmer[:, ::-1], [size[0] - centre[0], centre[1]], edge)
+    assert np.allclose(turned.likely[:, ::-1], seen.likely, atol=0.02)
+    assert np.allclose(turned.heat[list(JOINT_MIRROR)][:, :, ::-1], seen.heat, atol=0.02)
+
+
+def test_likelihoods_are_likelihoods(farmer: np.ndarray) -> None:
+    seen = look(farmer, np.array(farmer.shape[1::-1]) / 2, float(max(farmer.shape)))
+    assert np.allclose(seen.heat.sum(axis=(1, 2)), 1, atol=1e-4)
+    assert np.allclose(seen.labels.sum(axis=0), 1, atol=1e-4)
+    assert 0 <= seen.likely.min() <= seen.likely.max() <= 1
+
+
+def test_parts_lie_in_the_mask_and_joints_on_the_picture(farmer: np.ndarray) -> None:
+    found = infer_figure(farmer)
+    assert found is not None
+    assert ((found.part_labels > 0) == found.mask).all()
+    assert (found.joints_px >= 0).all()
+    assert (found.joints_px <= farmer.shape[1::-1]).all()
+    head = np.argwhere(found.part_labels == PART["head"]).mean(axis=0)
+    assert abs(head[0] - found.joints_px[JOINT["head"], 1]) < 0.15 * farmer.shape[0]
+
+
+def test_a_known_mask_is_kept(farmer: np.ndarray) -> None:
+    mask = np.asarray(Image.open(FARMER / "mask.png").convert("L")) > 127
+    found = infer_figure(farmer, mask)
+    assert found is not None
+    assert np.array_equal(found.mask, mask)
+
+
+def test_nothing_is_found_on_an_empty_sheet() -> None:
+    assert infer_figure(np.full((120, 80, 3), 250, np.uint8)) is None
+
+
+def test_a_square_beyond_the_picture_is_filled_with_its_rim() -> None:
+    picture = np.full((10, 20, 3), 40, np.uint8)
+    picture[3:7, 5:9] = 200
+    seen = square(picture, np.array([-10.0, -15.0]), 40.0, 80)
+    assert seen.shape == (80, 80, 3)
+    assert (seen[:20] == 40).all()
+    assert (seen[38:42, 32:36] == 200).all()
+
+
+def test_cells_spread_over_the_picture_where_they_were_seen() -> None:
+    picture = np.zeros((60, 40, 3), np.uint8)
+    seen = look(picture, np.array([20.0, 30.0]), 64.0)
+    values = np.zeros((16, 16), np.float32)
+    values[8:, 8:] = 1
+    out = spread(values, seen, (60, 40))
+    assert out[45, 30] == 1
+    assert out[10, 30] == 0
+
+
+def test_the_table_names_every_drawing(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    for name in ("image.png", "mask.png", "keypoints.json"):
+        (tmp_path / "one" / name).write_bytes((FARMER / name).read_bytes())
+    assert [each.name for each in drawings(tmp_path)] == ["one"]
+    text = evaluate_parse(tmp_path)
+    assert "| one |" in text
+    assert "| mean |" in text
+    assert all(f"| {ground} |" in text for ground in GROUNDS)
