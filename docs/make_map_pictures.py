@@ -42,9 +42,9 @@ VIEW = """(async () => {
 })()"""
 
 
-def globe(models: list[Path], picture: Path) -> None:
-    """Three GLBs and the map on the page of `fig2mesh globe`."""
-    assets, overlays = find_assets(tuple(models)), (Overlay(MAP / "map.jpg", *EDGES),)
+def globe(tiles: Path, picture: Path) -> None:
+    """The tileset of the three and the map on the page of `fig2mesh globe`."""
+    assets, overlays = find_assets((tiles,)), (Overlay(MAP / "map.jpg", *EDGES),)
     server = page_server(globe_page(assets, overlays), 0, {"cesium": cesium_js()}, page_files(assets, overlays))
     west, south, east, north = EDGES
     # West and south of the middle: the panel covers the left, and nearer things look larger.
@@ -80,9 +80,10 @@ def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/map")
     names = [name for name, _, _ in draw_map.PEOPLE]
     models = [folder / f"{name}{suffix}" for name in names for suffix in (".glb", ".usdc")]
-    if not all(model.is_file() for model in models):
+    tiles = folder / "tiles" / "tileset.json"
+    if not all(file.is_file() for file in (*models, tiles)):
         run(folder)
-    globe(models[0::2], ROOT / "docs" / "globe.jpg")
+    globe(tiles, ROOT / "docs" / "globe.jpg")
     map_in_blender(models[1::2], folder, ROOT / "docs" / "blender_map.jpg")
 
 

@@ -97,7 +97,8 @@ def test_document_says_what_the_asset_says(tmp_path: Path) -> None:
     (material,) = gltf.materials
     assert "KHR_materials_unlit" in material.extensions
     assert not material.doubleSided
-    (sampler,) = gltf.samplers
+    sampler, evidence = gltf.samplers
+    assert (evidence.magFilter, evidence.minFilter) == (9728, 9728)
     assert (sampler.magFilter, sampler.minFilter, sampler.wrapS, sampler.wrapT) == (9729, 9987, 33071, 33071)
     position = gltf.accessors[gltf.meshes[0].primitives[0].attributes.POSITION]
     vertices = asset().mesh.vertices

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from exporters.czml import write_czml
 from exporters.glb import write_glb, write_gltf
 from exporters.tiles import write_tileset
 from fig2mesh.errors import InputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
-from tests.clients.places import czml
 from tests.exporters.analytic import ZURICH, asset, capsule
 
 
@@ -82,11 +82,12 @@ def test_nothing_outside_of_a_tilesets_folder_is_served(tmp_path: Path, figure: 
 
 
 def test_czml_brings_its_models_and_folders_their_files(tmp_path: Path, figure: Path) -> None:
-    write_json(tmp_path / "people.czml", czml(ZURICH, "farmer.glb"))
+    write_czml(asset(ZURICH, lods=(capsule(6, 2),)), tmp_path / "farmer.czml")
     write_json(tmp_path / "index.geojson", {"type": "FeatureCollection", "features": []})
     found = find_assets((tmp_path,))
-    assert [each.kind for each in found] == ["model", "geojson", "czml"]
-    assert found[2].files == ("people.czml", "farmer.glb")
+    assert {each.kind: each.files for each in found} == {
+        "model": ("farmer.glb",), "geojson": ("index.geojson",), "czml": ("farmer.czml", "farmer.glb"),
+    }  # fmt: skip
 
 
 CASES = [

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exporters.glb import glb_bytes, write_glb
+from exporters.asset import Asset
+from exporters.czml import write_czml
+from exporters.glb import glb_bytes, write_gltf
 from exporters.tiles import write_tileset
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server
 from tests.browser import Look, pixels, serving
-from tests.clients.places import BARE, czml
+from tests.clients.places import BARE
 from tests.exporters.analytic import HEIGHT, ZURICH, asset
 
 EAST = replace(ZURICH, lon_deg=ZURICH.lon_deg + 4e-5, heading_deg=30.0)
@@ -51,21 +53,30 @@ LEVEL = """(async () => {{
 }})()"""
 
 
+def write_by_part(figure: Asset, path: Path) -> None:
+    """A file that says of each part how much of it the drawing showed, but not of each texel."""
+    write_gltf(figure, path)
+    document = json.loads(path.read_text())
+    del document["extensions"]["EXT_structural_metadata"]["propertyTextures"]
+    del document["meshes"][0]["primitives"][0]["extensions"]["EXT_structural_metadata"]
+    path.write_text(json.dumps(document))
+
+
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory, look: Look, cesium: Path) -> dict[str, Any]:
     """One session of the browser, its results by name."""
     folder = tmp_path_factory.mktemp("globe")
     write_tileset(asset(ZURICH), folder / "tiles")
-    write_glb(asset(EAST), folder / "model.glb")
-    write_glb(asset(NORTH), folder / "entity.glb")
-    document = czml(NORTH, "entity.glb")
+    write_by_part(asset(EAST), folder / "model.gltf")
+    write_czml(asset(NORTH, name="marked"), folder / "people.czml")
+    document = json.loads((folder / "people.czml").read_text())
     document[1]["properties"] = {"credit": "of the packet", "source": "map 7"}
     (folder / "people.czml").write_text(json.dumps(document))
     properties = {"name": "pin", "heading_deg": 90}
     point = {"type": "Point", "coordinates": [ZURICH.lon_deg, ZURICH.lat_deg - 1e-4]}
     features = [{"type": "Feature", "properties": properties, "geometry": point}]
     (folder / "index.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
-    paths = (folder / "tiles", folder / "model.glb", folder / "people.czml", folder / "index.geojson")
+    paths = (folder / "tiles", folder / "model.gltf", folder / "people.czml", folder / "index.geojson")
     middle = f"new Cesium.Cartesian2({SIZE / 2}, {SIZE / 2})"
     actions: dict[str, dict[str, Any]] = {
         "at first": {"evaluate": "document.getElementById('figures').textContent"},
