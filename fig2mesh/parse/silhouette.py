@@ -30,7 +30,7 @@ ROUGH: Final = 7.0
 AGREED: Final = 0.72
 """IoU with the guess from which an outline that lines have is believed."""
 
-BESIDE: Final = 0.3
+BESIDE: Final = 0.4
 LOST: Final = 0.8
 """Pieces that lines enclose and colours do not are left out below the one likelihood; those that colours find and
 lines do not are taken in above the other."""
@@ -137,7 +137,7 @@ def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
     cells = (colours // 16).astype(int)
     flat = cells[:, 0] * 256 + cells[:, 1] * 16 + cells[:, 2]
     values, counts = np.unique(flat, return_counts=True)
-    return np.median(colours[flat == values[counts.argmax()]], axis=0)
+    return np.asarray(np.median(colours[flat == values[counts.argmax()]], axis=0))
 
 
 def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
@@ -233,7 +233,7 @@ def by_colour(rgb: FloatArray, likely: FloatArray) -> BoolArray:
     prior = np.log(np.clip(likely, 0.01, 0.99) / np.clip(1 - likely, 0.01, 0.99))
     both = 1 / (1 + np.exp(-(prior + 0.45 * np.clip(colour, -3, 3))))
     side = max(likely.shape)
-    smooth = guided(rgb / 255, both.astype(np.float32), max(2, side // 90), 2e-3)
+    smooth = guided((rgb / 255).astype(np.float32), both.astype(np.float32), max(2, side // 90), 2e-3)
     mask = (smooth > 0.5) & (likely > 0.04)
     return _tidy(mask, likely)
 

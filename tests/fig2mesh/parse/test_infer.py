@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from fig2mesh.evaluate_parse import GROUNDS, bare, drawings, evaluate_parse, measure
-from fig2mesh.parse.infer import infer_figure, look, spread, square
+from fig2mesh.parse.infer import infer_figure, look, on_light, spread, square
 from fig2mesh.parse.read import read_picture
 from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import JOINT, PART
@@ -61,6 +61,17 @@ def test_a_known_mask_is_kept(farmer: np.ndarray) -> None:
     found = infer_figure(farmer, mask)
     assert found is not None
     assert np.array_equal(found.mask, mask)
+
+
+def test_plain_dark_grounds_become_white_and_others_stay() -> None:
+    dark = np.full((40, 40, 3), 8, np.uint8)
+    dark[10:30, 10:30] = 200
+    dark[15:20, 15:20] = 8  # enclosed: part of the figure
+    light = on_light(dark)
+    assert (light[:10] == 255).all()
+    assert np.array_equal(light[10:30, 10:30], dark[10:30, 10:30])
+    for other in (255 - dark, np.random.default_rng(0).integers(0, 60, (40, 40, 3)).astype(np.uint8)):
+        assert np.array_equal(on_light(other), other)
 
 
 def test_nothing_is_found_on_an_empty_sheet() -> None:
