@@ -79,14 +79,33 @@ def _outline(rgb: FloatArray, likely: FloatArray) -> BoolArray:
     if sheet is None or sheet.share < PLAIN_SHARE:
         return coloured
     enclosed, score = _enclosed(sheet, likely)
-    return _merged(enclosed, coloured, likely) if score >= AGREED else coloured
+    return _merged(sheet, enclosed, coloured, likely) if score >= AGREED else coloured
 
 
-def _merged(enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
+def _merged(sheet: Sheet, enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
     """What lines enclose, without what stands or lies beside the figure, and with what a gap in its outline lost."""
     beside = _pieces(enclosed & ~coloured, likely, below=BESIDE)
+    beside &= ~_bridges(beside, enclosed & ~beside)
+    # What has the ground's colour and is enclosed all the same is no shadow: a limb left blank between its lines.
+    beside &= ~_pieces(beside, (~_lines(sheet)).astype(np.float32), above=0.5)
     lost = _pieces(coloured & ~enclosed, likely, above=LOST)
     return (enclosed & ~beside) | lost
+
+
+def _bridges(pieces: BoolArray, kept: BoolArray) -> BoolArray:
+    """The pieces of a mask that join two pieces of another: a forearm between sleeve and hand."""
+    regions, count = ndimage.label(pieces, np.ones((3, 3)))
+    others, most = ndimage.label(kept, np.ones((3, 3)))
+    if most < 2 or not count:
+        return np.zeros_like(pieces)
+    size = np.bincount(others.ravel())
+    found = np.zeros(count + 1, bool)
+    for index, window in enumerate(ndimage.find_objects(regions), start=1):
+        wide = tuple(slice(max(cut.start - 1, 0), cut.stop + 1) for cut in window)
+        near = ndimage.binary_dilation(regions[wide] == index, np.ones((3, 3)))
+        touched = np.unique(others[wide][near])
+        found[index] = (size[touched[touched > 0]] > 1e-4 * kept.size).sum() > 1
+    return np.asarray(found[regions])
 
 
 def _pieces(mask: BoolArray, likely: FloatArray, below: float = 2.0, above: float = -1.0) -> BoolArray:
@@ -142,7 +161,7 @@ def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
     """What lines or colours enclose, for the gap width whose result agrees best with the guess; and how well."""
-    line = sheet.away > max(5 * sheet.noise, FAINT)
+    line = _lines(sheet)
     best, top = likely > 0.5, -1.0
     for gap in GAPS:
         found = _flooded(line, likely, gap)
@@ -152,6 +171,10 @@ def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
         if score > top + (0.01 if gap else 0):
             best, top = found, score
     return best, top
+
+
+def _lines(sheet: Sheet) -> BoolArray:
+    return np.asarray(sheet.away > max(5 * sheet.noise, FAINT))
 
 
 def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
@@ -188,7 +211,8 @@ def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:
     """Without pieces that the network does not hold for the figure, and without what sticks out far from it."""
     reach = max(3, round(0.045 * max(figure.shape)))
     away = ndimage.distance_transform_edt(likely < 0.3)
-    figure = figure & ((away < reach) | (likely > 0.06))
+    near = figure & ((away < reach) | (likely > 0.06))
+    figure = near | _bridges(figure & ~near, near)
     regions, count = ndimage.label(figure, np.ones((3, 3)))
     if not count:
         return figure
