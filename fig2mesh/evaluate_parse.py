@@ -120,12 +120,9 @@ def bare(rgba: ByteArray, ground: str) -> ByteArray:
         from fig2mesh.training.background import draw_background
 
         height, width = rgba.shape[:2]
-        made = draw_background("coast", (256, 256), np.random.default_rng(3))
-        side = max(height, width)
-        behind = np.asarray(Image.fromarray(np.clip(made, 0, 255).astype(np.uint8)).resize((side, side)))[
-            :height, :width
-        ]
-    return np.rint(rgba[..., :3] * alpha + behind * (1 - alpha)).astype(np.uint8)
+        made = np.clip(draw_background("coast", (256, 256), np.random.default_rng(3)), 0, 255).astype(np.uint8)
+        behind = np.asarray(Image.fromarray(made).resize((max(height, width),) * 2))[:height, :width]
+    return np.asarray(np.rint(rgba[..., :3] * alpha + behind * (1 - alpha)), np.uint8)
 
 
 def table(scores: list[Score]) -> str:
@@ -139,5 +136,7 @@ def table(scores: list[Score]) -> str:
 
 
 def _mean(scores: list[Score]) -> Score:
-    names = ("iou", "pck05", "pck10", "sides", "seen")
-    return Score("mean", *(float(np.mean([getattr(each, name) for each in scores])) for name in names))
+    def mean(name: str) -> float:
+        return float(np.mean([getattr(each, name) for each in scores]))
+
+    return Score("mean", mean("iou"), mean("pck05"), mean("pck10"), mean("sides"), mean("seen"))

@@ -17,6 +17,11 @@ from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, FloatArray
 ROOM: Final = 0.12
 """Space round the figure in the second look, share of its size."""
 
+DARK: Final = 70
+SAME: Final = 12
+PLAIN_RIM: Final = 0.7
+"""A ground is plain and dark where this share of the picture's rim is within `SAME` of a colour darker than `DARK`."""
+
 FINEST: Final = 320
 """Cells a side in which part labels are told apart; the network's own are a third as fine."""
 
@@ -65,15 +70,16 @@ def infer_figure(rgb: ByteArray, mask: BoolArray | None = None) -> Inference | N
     rgb : (H, W, 3) uint8, a crop with one figure; mask : its silhouette, where that is known
     """
     height, width = rgb.shape[:2]
+    shown = on_light(rgb)
     if mask is None:
-        first = look(rgb, np.array([width, height]) / 2, 1.04 * max(height, width))
+        first = look(shown, np.array([width, height]) / 2, 1.04 * max(height, width))
         box = _box(first, (height, width))
         if box is None:
             return None
     else:
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         box = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1], float)
-    second = look(rgb, (box[:2] + box[2:]) / 2, (1 + 2 * ROOM) * float((box[2:] - box[:2]).max()))
+    second = look(shown, (box[:2] + box[2:]) / 2, (1 + 2 * ROOM) * float((box[2:] - box[:2]).max()))
     likely = spread(second.likely, second, (height, width))
     found = refine(rgb, likely) if mask is None else mask
     if not found.any():
@@ -97,6 +103,19 @@ def infer_figure(rgb: ByteArray, mask: BoolArray | None = None) -> Inference | N
         confidence=sure.astype(np.float32),
         doubts=tuple(said),
     )
+
+
+def on_light(rgb: ByteArray) -> ByteArray:
+    """The picture with a plain dark ground made white: the network has learned from light ones."""
+    rim = np.concatenate([rgb[0], rgb[-1], rgb[:, 0], rgb[:, -1]]).astype(np.int16)
+    colour = np.median(rim, axis=0)
+    if colour.mean() > DARK or (np.abs(rim - colour).max(axis=1) <= SAME).mean() < PLAIN_RIM:
+        return rgb
+    ground = (np.abs(rgb.astype(np.int16) - colour) <= SAME).all(axis=2)
+    regions, _ = ndimage.label(ground)
+    ends = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
+    outside = np.isin(regions, ends[ends > 0])
+    return np.where(outside[..., None], np.uint8(255), rgb)
 
 
 def look(rgb: ByteArray, centre: NDArray[np.floating], edge: float) -> Look:
@@ -139,7 +158,7 @@ def square(rgb: ByteArray, low: NDArray[np.floating], edge: float, size: int) ->
         canvas[y0 - top : y1 - top, x0 - left : x1 - left] = rgb[y0:y1, x0:x1]
     box = (low[0] - left, low[1] - top, low[0] - left + edge, low[1] - top + edge)
     return np.asarray(Image.fromarray(canvas).resize((size, size), Image.Resampling.BOX if edge > 2 * size else
-                                                     Image.Resampling.BILINEAR, box=box, reducing_gap=2.0))  # fmt: skip
+                                                     Image.Resampling.BILINEAR, box=box))  # fmt: skip
 
 
 def spread(values: FloatArray, seen: Look, shape: tuple[int, int]) -> FloatArray:
@@ -195,4 +214,4 @@ def _box(seen: Look, shape: tuple[int, int]) -> NDArray[np.float64] | None:
         low, high = np.minimum(low, good.min(axis=0) - 0.02), np.maximum(high, good.max(axis=0) + 0.02)
     bounds = np.array([*(seen.low + low * seen.edge), *(seen.low + high * seen.edge)])
     limits = np.array([shape[1], shape[0]] * 2, float)
-    return np.clip(bounds, 0, limits)
+    return np.asarray(np.clip(bounds, 0, limits))

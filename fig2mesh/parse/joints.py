@@ -116,10 +116,11 @@ def _two_places(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The likeliest place of both maps together and the next that lies apart from it, if it is likely enough."""
     size = left.shape[0]
-    both = (left + right) / 2
+    both = ((left + right) / 2).astype(np.float32)
     best, _ = peak(both)
     y, x = (np.mgrid[:size, :size] + 0.5) / size
-    rest = np.where(np.hypot(x - best[0], y - best[1]) < 1.5 * APART * tall, 0, both)
+    apart = np.hypot(x - best[0], y - best[1]) >= 1.5 * APART * tall
+    rest = (both * apart).astype(np.float32)
     other, likely = peak(rest)
     return (best, other) if likely > 0.12 else (first, second)
 

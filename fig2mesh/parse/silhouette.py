@@ -30,7 +30,7 @@ ROUGH: Final = 7.0
 AGREED: Final = 0.72
 """IoU with the guess from which an outline that lines have is believed."""
 
-BESIDE: Final = 0.3
+BESIDE: Final = 0.4
 LOST: Final = 0.8
 """Pieces that lines enclose and colours do not are left out below the one likelihood; those that colours find and
 lines do not are taken in above the other."""
@@ -79,14 +79,33 @@ def _outline(rgb: FloatArray, likely: FloatArray) -> BoolArray:
     if sheet is None or sheet.share < PLAIN_SHARE:
         return coloured
     enclosed, score = _enclosed(sheet, likely)
-    return _merged(enclosed, coloured, likely) if score >= AGREED else coloured
+    return _merged(sheet, enclosed, coloured, likely) if score >= AGREED else coloured
 
 
-def _merged(enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
+def _merged(sheet: Sheet, enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
     """What lines enclose, without what stands or lies beside the figure, and with what a gap in its outline lost."""
     beside = _pieces(enclosed & ~coloured, likely, below=BESIDE)
+    beside &= ~_bridges(beside, enclosed & ~beside)
+    # What has the ground's colour and is enclosed all the same is no shadow: a limb left blank between its lines.
+    beside &= ~_pieces(beside, (~_lines(sheet)).astype(np.float32), above=0.5)
     lost = _pieces(coloured & ~enclosed, likely, above=LOST)
     return (enclosed & ~beside) | lost
+
+
+def _bridges(pieces: BoolArray, kept: BoolArray) -> BoolArray:
+    """The pieces of a mask that join two pieces of another: a forearm between sleeve and hand."""
+    regions, count = ndimage.label(pieces, np.ones((3, 3)))
+    others, most = ndimage.label(kept, np.ones((3, 3)))
+    if most < 2 or not count:
+        return np.zeros_like(pieces)
+    size = np.bincount(others.ravel())
+    found = np.zeros(count + 1, bool)
+    for index, window in enumerate(ndimage.find_objects(regions), start=1):
+        wide = tuple(slice(max(cut.start - 1, 0), cut.stop + 1) for cut in window)
+        near = ndimage.binary_dilation(regions[wide] == index, np.ones((3, 3)))
+        touched = np.unique(others[wide][near])
+        found[index] = (size[touched[touched > 0]] > 1e-4 * kept.size).sum() > 1
+    return np.asarray(found[regions])
 
 
 def _pieces(mask: BoolArray, likely: FloatArray, below: float = 2.0, above: float = -1.0) -> BoolArray:
@@ -137,12 +156,12 @@ def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
     cells = (colours // 16).astype(int)
     flat = cells[:, 0] * 256 + cells[:, 1] * 16 + cells[:, 2]
     values, counts = np.unique(flat, return_counts=True)
-    return np.median(colours[flat == values[counts.argmax()]], axis=0)
+    return np.asarray(np.median(colours[flat == values[counts.argmax()]], axis=0))
 
 
 def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
     """What lines or colours enclose, for the gap width whose result agrees best with the guess; and how well."""
-    line = sheet.away > max(5 * sheet.noise, FAINT)
+    line = _lines(sheet)
     best, top = likely > 0.5, -1.0
     for gap in GAPS:
         found = _flooded(line, likely, gap)
@@ -152,6 +171,10 @@ def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
         if score > top + (0.01 if gap else 0):
             best, top = found, score
     return best, top
+
+
+def _lines(sheet: Sheet) -> BoolArray:
+    return np.asarray(sheet.away > max(5 * sheet.noise, FAINT))
 
 
 def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
@@ -188,7 +211,8 @@ def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:
     """Without pieces that the network does not hold for the figure, and without what sticks out far from it."""
     reach = max(3, round(0.045 * max(figure.shape)))
     away = ndimage.distance_transform_edt(likely < 0.3)
-    figure = figure & ((away < reach) | (likely > 0.06))
+    near = figure & ((away < reach) | (likely > 0.06))
+    figure = near | _bridges(figure & ~near, near)
     regions, count = ndimage.label(figure, np.ones((3, 3)))
     if not count:
         return figure
@@ -233,7 +257,7 @@ def by_colour(rgb: FloatArray, likely: FloatArray) -> BoolArray:
     prior = np.log(np.clip(likely, 0.01, 0.99) / np.clip(1 - likely, 0.01, 0.99))
     both = 1 / (1 + np.exp(-(prior + 0.45 * np.clip(colour, -3, 3))))
     side = max(likely.shape)
-    smooth = guided(rgb / 255, both.astype(np.float32), max(2, side // 90), 2e-3)
+    smooth = guided((rgb / 255).astype(np.float32), both.astype(np.float32), max(2, side // 90), 2e-3)
     mask = (smooth > 0.5) & (likely > 0.04)
     return _tidy(mask, likely)
 

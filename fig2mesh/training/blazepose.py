@@ -57,19 +57,24 @@ def _ordered(encoder: Encoder) -> list[nn.Conv2d]:
         between: list[nn.Conv2d] = [side.filter, side.mix] if side is not None else []
         return [widened.widen, *between, widened.filter, widened.narrow]
 
-    stages = [list(stage) for stage in (encoder.stage64, encoder.stage32, encoder.stage16, encoder.stage8)]  # type: ignore[arg-type]
+    stages = (encoder.stage64, encoder.stage32, encoder.stage16, encoder.stage8)
     # The side at 128 pixels a side is BlazePose's own and goes to its segmentation: skipped by `_convolutions`.
     out: list[nn.Conv2d] = [encoder.stem, encoder.stem_filter, encoder.stem_narrow]
     for stage, side in zip(stages, (None, encoder.side64, encoder.side32, encoder.side16), strict=True):
         for index, widened in enumerate(stage):
+            assert isinstance(widened, Widened)
             out += block(widened, side if index == 0 else None)
     return [*out, encoder.last, encoder.last_filter, encoder.side8.filter, encoder.side8.mix]
 
 
 def _convolutions(path: Path) -> list[tuple[NDArray[np.float32], NDArray[np.float32]]]:
     """Kernel and bias of the convolutions in the file's order, without the two of the side at 128 pixels."""
-    import tflite
-
+    try:
+        import tflite
+    except ImportError:
+        raise InputError("--blazepose", "tflite is not installed", "pip install 'fig2mesh[training]'") from None
+    if not path.is_file():
+        raise InputError(path, "no such file", REMEDY)
     model: Any = tflite.Model.GetRootAsModel(path.read_bytes(), 0)
     graph = model.Subgraphs(0)
     source: dict[int, int] = {}

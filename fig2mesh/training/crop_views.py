@@ -95,7 +95,8 @@ class Viewer:
         zoom = rng.uniform(0.75, 2.2)
         matrix = cv2.getRotationMatrix2D((128, 128), float(rng.uniform(-180, 180)), zoom)
         matrix[:, 2] += self.size / 2 - 128 + rng.uniform(-40, 40, 2)
-        return cv2.warpAffine(ground, matrix, (self.size, self.size), borderMode=cv2.BORDER_REFLECT).astype(np.float32)
+        moved = cv2.warpAffine(ground, matrix, (self.size, self.size), borderMode=cv2.BORDER_REFLECT)
+        return np.asarray(moved, np.float32)
 
     def _neighbour(self, picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
         """Another figure at the rim."""
@@ -142,7 +143,7 @@ def _pasted(
     moved = cv2.warpAffine(layer, matrix, picture.shape[1::-1], flags=cv2.INTER_LINEAR)
     if rng.random() < 0.06:  # printed in one ink
         moved[..., :3] = moved[..., :3].mean(axis=-1, keepdims=True) * rng.uniform(0.3, 1.0, 3)
-    return picture * (1 - moved[..., 3:]) + moved[..., :3]
+    return np.asarray(picture * (1 - moved[..., 3:]) + moved[..., :3], np.float32)
 
 
 def _decorated(
@@ -187,7 +188,7 @@ def scanned(picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[n
         gain, lift = rng.uniform(0.7, 1.25), rng.normal(0, 12)
         picture = np.clip((picture - 128) * gain + 128 + lift, 0, 255)
     if rng.random() < 0.25:
-        picture = 255 * (np.clip(picture, 0, 255) / 255) ** rng.uniform(0.6, 1.7)
+        picture = (255 * (np.clip(picture, 0, 255) / 255) ** rng.uniform(0.6, 1.7)).astype(np.float32)
     if rng.random() < 0.3:
         picture = picture * rng.uniform(0.8, 1.08, 3).astype(np.float32)
     if rng.random() < 0.18:
@@ -211,5 +212,5 @@ def scanned(picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[n
     out = np.clip(picture, 0, 255).astype(np.uint8)
     if rng.random() < 0.25:
         packed = cv2.imencode(".jpg", out, [cv2.IMWRITE_JPEG_QUALITY, int(rng.integers(15, 85))])[1]
-        out = cv2.imdecode(packed, cv2.IMREAD_COLOR)
+        out = np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.uint8)
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import cv2
@@ -103,7 +104,10 @@ def _thing(thing: Thing) -> tuple[int, NDArray[np.uint8]]:
 def _colours(manner: Manner, ink: Colour, rng: np.random.Generator) -> list[Colour]:
     """A colour a part label."""
     tints = BRIGHTS if rng.random() < 0.5 else MAP_TINTS
-    pick = lambda options: tuple(float(v) for v in options[int(rng.integers(len(options)))])  # noqa: E731
+
+    def pick(options: Sequence[tuple[int, int, int]]) -> Colour:
+        return tuple(float(v) for v in options[int(rng.integers(len(options)))])
+
     if manner.solid:
         one = ink if manner.kind in ("stick", "pictogram") and rng.random() < 0.7 else pick(tints)
         out = [one] * 18

@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from fig2mesh.errors import InputError
 from fig2mesh.evaluate_parse import score
 from fig2mesh.parse.infer import Inference, infer_figure, square
 from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray
@@ -102,8 +103,10 @@ def _grabcut(picture: ByteArray, truth: BoolArray) -> BoolArray:
 
 
 def _blazepose(path: Path) -> Callable[[ByteArray, BoolArray], Inference]:
-    from ai_edge_litert.interpreter import Interpreter
-
+    try:
+        from ai_edge_litert.interpreter import Interpreter
+    except ImportError:
+        raise InputError("--blazepose", "ai-edge-litert is not installed", "pip install ai-edge-litert") from None
     from fig2mesh.training.blazepose import LANDMARKS
 
     net: Any = Interpreter(model_path=str(path))

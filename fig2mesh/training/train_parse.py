@@ -20,6 +20,7 @@ from fig2mesh.nets.figure_parser import (
     HEAT,
     INPUT,
     JOINTS,
+    LABELS,
     MASK,
     Depthwise,
     FigureParser,
@@ -86,7 +87,7 @@ def train_parse(
         for module in net.encoder.modules():
             if isinstance(module, Depthwise):
                 module.requires_grad_(False)
-    net = net.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    net = net.to(memory_format=torch.channels_last)
     parts = [load_crops(data, "train", kind) for kind in KINDS]
     bodies, doodles = (len(part) for part in parts)
     viewer = Viewer(joined(*parts), seed)
@@ -192,16 +193,16 @@ def peaks(heat: Tensor) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 @torch.no_grad()
 def score(net: FigureParser, target: Mapping[str, Tensor]) -> dict[str, float]:
     """Scores of the network on views, by itself: no second look, no refinement."""
-    parts = [net(chunk) for chunk in target["picture"].split(16)]
+    parts = [net(chunk) for chunk in torch.split(target["picture"], 16)]
     found = Parsed(*(torch.cat(values) for values in zip(*parts, strict=True)))
     mask, own = target["labels"] > 0, found.silhouette > 0
     iou = (mask & own).sum((1, 2)) / (mask | own).sum((1, 2)).clamp_min(1)
     labels = found.labels.argmax(dim=1)
     each = []
     for row in range(len(labels)):
-        for part in target["labels"][row].unique().tolist():
-            if part:
-                a, b = labels[row] == part, target["labels"][row] == part
+        for part in range(1, LABELS):
+            a, b = labels[row] == part, target["labels"][row] == part
+            if b.any():
                 each.append(float((a & b).sum() / (a | b).sum()))
     places, _ = peaks(found.heat)
     rows = [np.flatnonzero(m.any(axis=1)) for m in mask.numpy()]

