@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from fig2mesh.cli import main
 from fig2mesh.settings import PRESETS, STAGES
@@ -103,9 +104,12 @@ def test_missing_figure_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture
     assert message.count("\n") == 1
 
 
-def test_bare_picture_says_what_to_pass(files: DrawnFiles, capfd: pytest.CaptureFixture[str]) -> None:
-    assert main([str(files.image)]) == 2
-    assert "--keypoints" in capfd.readouterr().err
+def test_an_empty_picture_says_what_to_pass(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    Image.new("RGB", (60, 80), "white").save(tmp_path / "empty.png")
+    assert main([str(tmp_path / "empty.png"), "-o", str(tmp_path / "a.glb")]) == 2
+    message = capfd.readouterr().err
+    assert "--keypoints" in message
+    assert len(message.strip().splitlines()) == 1
 
 
 def test_faults_of_ours_are_not_the_users(
