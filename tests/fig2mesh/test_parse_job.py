@@ -58,7 +58,19 @@ def test_confidences_stand_beside_the_joints(written: Path) -> None:
 def test_the_legend_names_the_labels(written: Path) -> None:
     image = Image.open(written / "part_labels.png")
     assert image.mode == "P"
-    assert image.text["legend"].split("; ")[2] == f"2 {PART_NAMES[2]}"
+    assert json.loads(image.text["legend"])["2"] == PART_NAMES[2]
+
+
+@pytest.mark.parametrize("kind", ["coco", "labelme", "supervisely"])
+def test_joints_in_the_files_of_annotation_tools(bare: Path, written: Path, tmp_path: Path, kind: str) -> None:
+    known = ["--mask", str(written / "mask.png"), "--keypoints", str(written / "keypoints.json")]
+    assert main(["parse", str(bare), *known, "-o", str(tmp_path / "out"), "--format", kind, "-q"]) == 0
+    ours, theirs = (
+        read_figure(bare, mask=written / "mask.png", keypoints=folder / "keypoints.json")
+        for folder in (written, tmp_path / "out")
+    )
+    assert np.allclose(ours.joints_px, theirs.joints_px, atol=0.06)
+    assert np.array_equal(ours.visible, theirs.visible)
 
 
 def test_a_box_is_a_window_of_the_same_picture(bare: Path, tmp_path: Path) -> None:

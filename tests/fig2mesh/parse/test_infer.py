@@ -10,7 +10,7 @@ from PIL import Image
 
 from fig2mesh.evaluate_parse import GROUNDS, bare, drawings, evaluate_parse, measure
 from fig2mesh.parse.infer import infer_figure, look, on_light, spread, square
-from fig2mesh.parse.read import read_picture
+from fig2mesh.parse.picture import read_rgba
 from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import JOINT, PART
 
@@ -19,7 +19,7 @@ FARMER = Path(__file__).parents[3] / "examples" / "figures" / "farmer"
 
 @pytest.fixture(scope="module")
 def farmer() -> np.ndarray:
-    return bare(read_picture(FARMER / "image.png"), "white")
+    return bare(read_rgba(FARMER / "image.png"), "white")
 
 
 # Measured with the shipped weights: docs/parsing.md. On black, black outlines are ground.
