@@ -57,23 +57,40 @@ def write_annotation(
     mean. Raises ExportError where the disk refuses or a file is there already.
     """
     height, width = annotation.mask.shape
-    joints = WRITERS[kind](annotation.joints_px, annotation.visible, (width, height), picture)
+
+    def fill(stage: Path) -> None:
+        save_annotation(stage, annotation, picture, kind, (width, height))
+
+    return write_whole(folder, folder / KEYPOINTS, fill, overwrite)
+
+
+def save_annotation(
+    folder: Path,
+    annotation: Annotation,
+    picture: str,
+    kind: str,
+    size: tuple[int, int],
+    corner: tuple[int, int] = (0, 0),
+) -> None:
+    """Save the three files in a folder that is there.
+
+    annotation : of a window of the picture; mask and labels are saved as large as that, joints in IMAGE of the picture
+    size : (width, height) of the picture; corner : (x, y) of the window; others as for `write_annotation`
+    """
+    points = annotation.joints_px + np.array(corner, np.float32)
+    joints = WRITERS[kind](points, annotation.visible, size, picture)
     if annotation.depth_order and kind == "fig2mesh":
         joints["depth_order"] = dict(annotation.depth_order)
     if annotation.confidence is not None and kind == "fig2mesh":
         rounded = [round(value, 3) for value in annotation.confidence.astype(float).tolist()]
         joints["confidence"] = dict(zip(JOINT_NAMES, rounded, strict=True))
-
-    def fill(stage: Path) -> None:
-        (stage / KEYPOINTS).write_text(json.dumps(joints, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        Image.fromarray(np.where(annotation.mask, np.uint8(255), np.uint8(0))).save(stage / MASK)
-        labels = Image.fromarray(np.where(annotation.mask, annotation.part_labels, np.uint8(0)))
-        labels.putpalette([value for colour in COLOURS for value in colour])
-        text = PngImagePlugin.PngInfo()
-        text.add_text("legend", json.dumps(dict(enumerate(PART_NAMES))))
-        labels.save(stage / PART_LABELS, pnginfo=text, optimize=False)
-
-    return write_whole(folder, folder / KEYPOINTS, fill, overwrite)
+    (folder / KEYPOINTS).write_text(json.dumps(joints, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    Image.fromarray(np.where(annotation.mask, np.uint8(255), np.uint8(0))).save(folder / MASK)
+    labels = Image.fromarray(np.where(annotation.mask, annotation.part_labels, np.uint8(0)))
+    labels.putpalette([value for colour in COLOURS for value in colour])
+    text = PngImagePlugin.PngInfo()
+    text.add_text("legend", json.dumps(dict(enumerate(PART_NAMES))))
+    labels.save(folder / PART_LABELS, pnginfo=text, optimize=False)
 
 
 def on_whole_picture(annotation: Annotation, corner: tuple[int, int], size: tuple[int, int]) -> Annotation:

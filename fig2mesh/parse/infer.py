@@ -73,7 +73,7 @@ def infer_figure(rgb: ByteArray, mask: BoolArray | None = None) -> Inference | N
     shown = on_light(rgb)
     if mask is None:
         first = look(shown, np.array([width, height]) / 2, 1.04 * max(height, width))
-        box = _box(first, (height, width))
+        box = box_of(first, (height, width))
         if box is None:
             return None
     else:
@@ -195,7 +195,7 @@ def part_labels(seen: Look, mask: BoolArray) -> ByteArray:
     return np.where(mask, out, 0).astype(np.uint8)
 
 
-def _box(seen: Look, shape: tuple[int, int]) -> NDArray[np.float64] | None:
+def box_of(seen: Look, shape: tuple[int, ...]) -> NDArray[np.float64] | None:
     """(4,) x0, y0, x1, y1 of the figure in the picture: its largest piece with what is near, and its joints."""
     guess = seen.likely > 0.5
     regions, count = ndimage.label(ndimage.binary_dilation(guess, iterations=2))
