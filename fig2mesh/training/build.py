@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import os
 import zipfile
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.errors import FigureError
 from fig2mesh.training.pack import Pack, load_pack
+from fig2mesh.training.shard_jobs import make_shards
 from fig2mesh.training.subject import SPLITS, draw_subject
 
 SHARD = 50
@@ -61,17 +60,7 @@ def build(
             path = out / f"{split}-{index:05d}.npz"
             if not _complete(path, len(rows)):
                 tasks.append((str(pack), split, rows, seed, pictures, shapes, path))
-    done = 0
-    report(done, len(tasks))
-    if jobs == 1:
-        for task in tasks:
-            _shard(*task)
-            report(done := done + 1, len(tasks))
-        return
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(_shard, *task) for task in tasks]):
-            future.result()
-            report(done := done + 1, len(tasks))
+    make_shards(_shard, tasks, jobs, report)
 
 
 def shards(data: Path, *splits: str) -> list[Path]:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 import os
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +16,7 @@ from numpy.typing import NDArray
 from fig2mesh.errors import FigureError
 from fig2mesh.training.build import read_shard
 from fig2mesh.training.pack import Pack, load_pack
+from fig2mesh.training.shard_jobs import make_shards
 from fig2mesh.training.subject import SPLITS
 
 KINDS: Final = ("bodies", "doodles")
@@ -78,17 +77,7 @@ def build_crops(
                     rows = range(first, min(first + step, count[kind]))
                     tasks.append((str(pack), kind, split, rows, seed, path))
     tasks.sort(key=lambda task: task[2] == "train")
-    done = 0
-    report(done, len(tasks))
-    if jobs == 1:
-        for task in tasks:
-            _shard(*task)
-            report(done := done + 1, len(tasks))
-        return
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        for future in as_completed([pool.submit(_shard, *task) for task in tasks]):
-            future.result()
-            report(done := done + 1, len(tasks))
+    make_shards(_shard, tasks, jobs, report)
 
 
 def load_crops(data: Path, split: str, kind: str = "*", most: int | None = None) -> Crops:
