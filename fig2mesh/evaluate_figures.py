@@ -140,7 +140,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     """All measures of one drawing's model, by the keys of `COLUMNS`."""
     figure = read_figure(**drawing.arguments())
     settings = replace(settings, lods=LEVELS)
-    figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}
     for step in steps(settings, FIGURE_HEIGHT):
         results[step.name] = step.run(*(results[name] for name in step.needs))

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from exporters.asset import Asset, TexturedMesh
 from exporters.profiles import Profile, profile_named
-from exporters.sampling import observed_share
 from exporters.write import check_outputs, has_levels, in_order, is_tileset, needs_place, write
-from fig2mesh import __version__
+from fig2mesh.convert import asset_of, settings_of, torch_device
 from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
@@ -26,7 +23,10 @@ from fig2mesh.place import Placed, PlaceRequest, clamp_note, open_map, place
 from fig2mesh.plan import COLOURING, Plan, plan
 from fig2mesh.records import Figure
 from fig2mesh.report import Timing, make_report
-from fig2mesh.settings import FIRST_USE, STAGES, Settings, settings_for
+from fig2mesh.settings import FIRST_USE, STAGES, Settings
+
+if TYPE_CHECKING:
+    from fig2mesh.pipeline import Step
 
 log = logging.getLogger("fig2mesh")
 
@@ -94,14 +94,15 @@ def run(
     if lods > 1 and resume_from is None and not any(has_levels(target) for target in targets):
         log.info("--lods %d: only 3D Tiles and USD have levels of detail; one is made", lods)
         lods = 1
-    settings = _settings(
+    settings = settings_of(
         quality=quality, triangles=triangles, texture_size=texture_size, lods=lods, parts=parts, textures=textures,
         contours=contours, effects=effects, mesher=mesher, closing=closing, device=torch_device(device), seed=seed,
     )  # fmt: skip
     from fig2mesh.parts.pieces import clean
+    from fig2mesh.pipeline import steps
 
     whole = drawn
-    drawn, pieces, specks = clean(drawn, settings.voxel, 2 * max(settings.texture_size, 1024))
+    drawn, pieces, specks = clean(drawn, settings.voxel, settings.picture_px)
     start = time.perf_counter()
     placed = place(request, sheet, drawn, figure)
     timings: list[Timing] = []
@@ -109,30 +110,24 @@ def run(
         placing_s += time.perf_counter() - start
         timings.append(Timing("place", placing_s, peak_mb(), "at --map" if sheet is not None else "at --lonlat"))
     tell(placed, clamp_note(request, targets))
-    stages = None if save_stages is None else _stages(save_stages, whole, settings, resume_from)
+    planned = plan(settings, targets)
+    normals = any(effect.runs for effect in planned.effects if effect.name == "normals")
+    stages = None if save_stages is None else _stages(save_stages, whole, settings, normals, resume_from)
     del whole  # four bytes a pixel of what may be a whole sheet
     if specks:
         log.warning("%s: %d specks of the silhouette are too small to model and were left out", figure, specks)
     results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
     written: list[Path] = []
-    planned = plan(settings, targets)
     with progress(quiet) as advance, counting() as counts:
-        _run_steps(settings, placed.height_m, results, timings, stages, resume_from, advance, planned)
+        road = steps(settings, placed.height_m, normals=normals)
+        _run_steps(road, results, timings, stages, resume_from, advance, planned)
         found = results["solid"].how
         if found.components != pieces:
             log.warning("%s: %d solids for %d drawn pieces; %s", figure, found.components, pieces, found.note)
-        levels = results["model"]
-        if not evidence:
-            levels = tuple(replace(level, parts=None, observed=None) for level in levels)
-        asset = Asset(
-            name=drawn.name,
-            lods=levels,
-            placement=placed.placement,
-            part_names=_part_names(levels) if evidence else {},
-            copyright=credit,
-            lit=settings.light,
-            metadata={**_metadata(figure, settings.seed, quality, levels[0]), **placed.metadata},
-        )
+        asset = asset_of(
+            drawn.name, results["model"], settings, placed, source=figure.name, quality=quality, credit=credit,
+            evidence=evidence,
+        )  # fmt: skip
         for target in in_order(targets):
             advance(f"write {target}")
             start = time.perf_counter()
@@ -154,8 +149,7 @@ def run(
 
 
 def _run_steps(
-    settings: Settings,
-    height_m: float,
+    road: Sequence[Step],
     results: dict[str, Any],
     timings: list[Timing],
     folder: Path | None,
@@ -163,12 +157,9 @@ def _run_steps(
     advance: Any,
     planned: Plan,
 ) -> None:
-    from fig2mesh.pipeline import steps
     from fig2mesh.stages import load_stage, save_stage
 
     why = {stage.name: stage.why for stage in planned.stages}
-    normals = any(effect.runs for effect in planned.effects if effect.name == "normals")
-    road = steps(settings, height_m, normals=normals)
     first = 0 if resume_from is None else next(i for i, step in enumerate(road) if step.name == resume_from)
     timings += [Timing(each.name, 0.0, peak_mb(), each.why, runs=False) for each in planned.stages if not each.runs]
     for index, step in enumerate(road):
@@ -186,15 +177,11 @@ def _run_steps(
             save_stage(folder, step.name, results[step.name])
 
 
-def _stages(folder: Path, figure: Figure, settings: Settings, resume_from: str | None) -> Path:
+def _stages(folder: Path, figure: Figure, settings: Settings, normals: bool, resume_from: str | None) -> Path:
     """Make the folder of stages ready: empty of other runs, or checked to be of this one where it goes on."""
-    from fig2mesh.stages import clear_stages, load_stage, save_stage
+    from fig2mesh.stages import clear_stages, figure_digest, load_stage, save_stage
 
-    digest = hashlib.sha256()
-    for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
-        digest.update(str(array.shape).encode() + array.tobytes())
-    digest.update(repr(sorted(figure.depth_order.items())).encode())
-    request = {"figure": digest.hexdigest(), **asdict(settings)}
+    request = {"figure": figure_digest(figure), "normals": normals, **asdict(settings)}
     if resume_from is None:
         clear_stages(folder)
         save_stage(folder, REQUEST, request)
@@ -245,46 +232,7 @@ def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any
     levels = lods if any(has_levels(target) for target in targets) else 1
     names = ("quality", "triangles", "texture_size", "parts", "textures", "contours", "effects", "mesher", "closing",
              "seed")  # fmt: skip
-    return plan(_settings(lods=levels, device="cpu", **{name: options[name] for name in names}), targets)
-
-
-def _settings(*, quality: Any, effects: tuple[str, ...], **given: Any) -> Settings:
-    return settings_for(quality, light=_light(effects), **given)
-
-
-def _light(effects: tuple[str, ...]) -> bool | None:
-    """Whether the surface is lit; None where nothing is said."""
-    if "none" in effects and len(set(effects)) > 1:
-        raise InputError("--effect", f"none beside {effects[0]}", "give either none or the effects wanted")
-    return "light" in effects if effects else None
-
-
-def torch_device(name: str) -> str:
-    """The device that --device names: "cpu" or "cuda"."""
-    import torch
-
-    if name == "cpu":
-        return "cpu"
-    available = torch.cuda.is_available()
-    if name == "cuda" and not available:
-        raise InputError("--device", "no usable CUDA device", "pass --device cpu or auto")
-    return "cuda" if available else "cpu"
-
-
-def _metadata(figure: Path, seed: int, quality: Any, mesh: TexturedMesh) -> dict[str, Any]:
-    """Facts that go with the figure into its files."""
-    facts = {"source": figure.name, "seed": seed, "quality": quality, "version": __version__}
-    share = observed_share(mesh)
-    return facts if share is None else facts | {"observed_share": round(share, 3)}
-
-
-def _part_names(levels: Any) -> dict[int, str]:
-    import numpy as np
-
-    from fig2mesh.records import PART_NAMES
-
-    labels = np.unique(np.concatenate([level.parts for level in levels]))
-    return {int(label): PART_NAMES[label] for label in labels}
+    return plan(settings_of(lods=levels, device="cpu", **{name: options[name] for name in names}), targets)
 
 
 def check_text(path: Path, overwrite: bool, option: str = "--report", another: str = "--report") -> None:

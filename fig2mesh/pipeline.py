@@ -29,7 +29,7 @@ from fig2mesh.placing import asset_from_figure
 from fig2mesh.pose.network import lift_by_network
 from fig2mesh.pose.order import ordered
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh, PointCloud, Pose3D, UvMesh
+from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh, PointCloud, Pose3D, Surface, UvMesh
 from fig2mesh.settings import Settings
 from fig2mesh.texture.sources import Sources, make_sources
 from fig2mesh.texture.votes import Unseen
@@ -123,10 +123,20 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
             for level, mesh in enumerate(unwrapped)
         )
 
+    def know_surface(body: Body, solid: Solid, levels: tuple[Mesh, ...]) -> tuple[Surface, ...]:
+        return tuple(
+            Surface(
+                normals=_shading_normals(mesh, body) if normals else None,
+                parts=_labels(body, mesh.vertices),
+                deviation=deviation(mesh, solid.mesh),
+            )
+            for mesh in levels
+        )
+
     def finish(
-        pose: Pose3D, body: Body, solid: Solid, unwrapped: tuple[UvMesh, ...], baked: tuple[Baked, ...]
+        pose: Pose3D, surfaces: tuple[Surface, ...], unwrapped: tuple[UvMesh, ...], baked: tuple[Baked, ...]
     ) -> tuple[TexturedMesh, ...]:
-        levels = finish_bare(pose, body, solid, tuple(mesh.solid for mesh in unwrapped))
+        levels = finish_bare(pose, surfaces, tuple(mesh.solid for mesh in unwrapped))
         return tuple(
             replace(
                 level,
@@ -142,23 +152,20 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
             for level, mesh, texture in zip(levels, unwrapped, baked, strict=True)
         )
 
-    def finish_bare(pose: Pose3D, body: Body, solid: Solid, meshes: tuple[Mesh, ...]) -> tuple[TexturedMesh, ...]:
+    def finish_bare(pose: Pose3D, surfaces: tuple[Surface, ...], meshes: tuple[Mesh, ...]) -> tuple[TexturedMesh, ...]:
         asset = asset_from_figure(pose, meshes[0].vertices, height_m)
         scale = float(asset.matrix[0, 0])
-        levels = []
-        for mesh in meshes:
-            mean, worst = deviation(mesh, solid.mesh)
-            levels.append(
-                TexturedMesh(
-                    vertices=asset.apply(mesh.vertices).astype(np.float32),
-                    faces=mesh.faces,
-                    normals=_shading_normals(mesh, body) if normals else None,
-                    solid_index=np.arange(len(mesh.vertices), dtype=np.int32),
-                    parts=_labels(body, mesh.vertices),
-                    deviation_m=(mean * scale, worst * scale),
-                )
+        return tuple(
+            TexturedMesh(
+                vertices=asset.apply(mesh.vertices).astype(np.float32),
+                faces=mesh.faces,
+                normals=surface.normals,
+                solid_index=np.arange(len(mesh.vertices), dtype=np.int32),
+                parts=surface.parts,
+                deviation_m=(surface.deviation[0] * scale, surface.deviation[1] * scale),
             )
-        return tuple(levels)
+            for mesh, surface in zip(meshes, surfaces, strict=True)
+        )
 
     meshing = (
         (Step("cloud", ("body",), scan_body), Step("solid", ("cloud", "body", "pieces"), mesh_cloud))
@@ -166,13 +173,13 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
         else (Step("solid", ("body", "pieces"), mesh_field),)
     )
     colouring = (
-        (Step("model", ("lift", "body", "solid", "simplify"), finish_bare, kept=False),)
+        (Step("model", ("lift", "surface", "simplify"), finish_bare, kept=False),)
         if settings.textures == "none"
         else (
             Step("unwrap", ("figure", "simplify"), unwrap_levels),
             Step("textures", ("figure", "lift", "parts", "body"), find_colours, kept=False),
             Step("bake", ("figure", "textures", "body", "unwrap"), bake_levels),
-            Step("model", ("lift", "body", "solid", "unwrap", "bake"), finish, kept=False),
+            Step("model", ("lift", "surface", "unwrap", "bake"), finish, kept=False),
         )
     )
     return (
@@ -181,6 +188,7 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
         Step("body", ("parts",), assemble, kept=False),
         *meshing,
         Step("simplify", ("solid",), simplify_levels),
+        Step("surface", ("body", "solid", "simplify"), know_surface),
         *colouring,
     )
 

@@ -49,6 +49,7 @@ def plan(settings: Settings, outputs: Sequence[str]) -> Plan:
         "cloud": "points for ball pivoting",
         "solid": f"the closed mesh, by {settings.mesher}",
         "simplify": f"{settings.triangles} triangles" + (f", {settings.lods} levels" if settings.lods > 1 else ""),
+        "surface": "normals, parts and deviation of the simplified mesh",
         "unwrap": "texture coordinates",
         "textures": "colours of unseen sides, " + ("by two networks" if inferred else "those in front of them"),
         "bake": f"a texture of {settings.texture_size} texels a side",

@@ -213,6 +213,25 @@ class Mesh(_Checked):
 
 
 @dataclass(frozen=True)
+class Surface(_Checked):
+    """What is known of a mesh besides its shape.
+
+    normals : (V, 3) float32 of its vertices, FIGURE; None where nobody asks for them
+    parts : (V,) uint8 label of the part nearest to each vertex
+    deviation : mean and largest distance to the mesh it was simplified from, FIGURE units
+    """
+
+    normals: FloatArray | None
+    parts: ByteArray
+    deviation: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        self._put("parts", np.uint8, (None,))
+        if self.normals is not None:
+            self._put("normals", np.float32, (len(self.parts), 3))
+
+
+@dataclass(frozen=True)
 class UvMesh(_Checked):
     """A mesh with a texture atlas; vertices are split along chart borders.
 

@@ -53,6 +53,30 @@ def make_report(
     The silhouette and the front view are measured on the finest textured mesh as it goes to the exporters, rendered
     orthographically at the drawing's resolution.
     """
+    return {
+        "fig2mesh": __version__,
+        "figure": {"file": inputs[0].name, "pieces": results["pieces"]},
+        "inputs": {str(path): _sha256(path) for path in inputs},
+        "outputs": {str(path): _sha256(path) for path in outputs},
+        "settings": asdict(settings),
+        "placement": asdict(asset.placement) if asset.placement else None,
+        "measures": model_measures(asset, results, height_m),
+        "lods": [
+            {"triangles": len(m.faces), "mean_deviation_m": m.deviation_m[0], "max_deviation_m": m.deviation_m[1]}
+            for m in asset.lods
+        ],
+        "meshing": asdict(results["solid"].how),
+        "versions": {name: version(name) for name in PACKAGES.values()},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def model_measures(asset: Asset, results: dict[str, Any], height_m: float) -> dict[str, Any]:
+    """How good a model is, by measures taken on the asset that goes to the exporters.
+
+    results : of the pipeline: figure, pieces, lift, simplify, model
+    """
     figure = results["figure"]
     frame = image_frame(figure)
     transform = asset_from_figure(results["lift"], results["simplify"][0].vertices, height_m)
@@ -64,26 +88,10 @@ def make_report(
     if shares is not None:
         observed = {"front_psnr_db": front.psnr_db, "front_ssim": front.ssim, "observed": _by_name(shares)}
     return {
-        "fig2mesh": __version__,
-        "figure": {"file": inputs[0].name, "pieces": results["pieces"]},
-        "inputs": {str(path): _sha256(path) for path in inputs},
-        "outputs": {str(path): _sha256(path) for path in outputs},
-        "settings": asdict(settings),
-        "placement": asdict(asset.placement) if asset.placement else None,
-        "measures": {
-            **shape_measures(asset.mesh),
-            "pieces_drawn": results["pieces"],
-            "silhouette_iou": iou,
-            **observed,
-        },
-        "lods": [
-            {"triangles": len(m.faces), "mean_deviation_m": m.deviation_m[0], "max_deviation_m": m.deviation_m[1]}
-            for m in asset.lods
-        ],
-        "meshing": asdict(results["solid"].how),
-        "versions": {name: version(name) for name in PACKAGES.values()},
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}",
+        **shape_measures(asset.mesh),
+        "pieces_drawn": results["pieces"],
+        "silhouette_iou": iou,
+        **observed,
     }
 
 

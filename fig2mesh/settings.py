@@ -53,20 +53,25 @@ class Settings:
     device: str = "cpu"
     seed: int = 0
 
+    @property
+    def picture_px(self) -> int:
+        """About how many pixels the longer side of a drawing is reduced to: no texture shows more."""
+        return 2 * max(self.texture_size, 1024)
+
 
 EFFECTS = ("light", "none")
 """What the main job can be asked for by name; `fig2mesh render` has more."""
 
-STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "unwrap", "textures", "bake", "model")
+STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "surface", "unwrap", "textures", "bake", "model")
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
 FIRST_USE = {
     "parts": "lift", "part_nodes": "parts", "precision": "parts",
     "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
-    "textures": "unwrap", "contours": "textures", "light": "model",
+    "normals": "surface", "textures": "unwrap", "contours": "textures", "light": "model",
 }  # fmt: skip
-"""Setting → the first stage that it changes."""
+"""Setting → the first stage that it changes; "normals": whether outputs or effects need them."""
 
 PRESETS: dict[Quality, Settings] = {
     "draft": Settings(canvas_px=256, voxel=0.01, part_nodes=24, spacing=0.012, triangles=6_000, texture_size=512),

@@ -8,9 +8,12 @@ elsewhere runs no code.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
+import secrets
 import zipfile
+import zlib
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from fig2mesh.errors import FigureError, OutputError
+from fig2mesh.records import Figure
 from fig2mesh.settings import STAGES
 
 
@@ -36,21 +40,37 @@ def _classes() -> dict[str, type]:
     }
 
 
+def figure_digest(figure: Figure) -> str:
+    """What a figure holds, in 64 hexadecimal digits; its name and where it was cut from do not count."""
+    digest = hashlib.sha256()
+    for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
+        digest.update(str(array.shape).encode() + array.tobytes())
+    digest.update(repr(sorted(figure.depth_order.items())).encode())
+    return digest.hexdigest()
+
+
 def save_stage(folder: Path, stage: str, value: object) -> None:
     """Write `value` to `folder/stage.npz`, whole or not at all."""
-    arrays: dict[str, Any] = {}
-    tree = _pack(value, arrays)
-    target = folder / f"{stage}.npz"
-    partial = folder / f".{stage}.partial.npz"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), __stage__=np.array(stage), **arrays)
-        os.replace(partial, target)
+        write_result(folder / f"{stage}.npz", stage, value)
     except OSError as error:
+        found = f"{folder / stage}.npz: {error.strerror}"
+        raise OutputError("--save-stages", found, "choose a folder that can be written") from None
+
+
+def write_result(path: Path, stage: str, value: object) -> None:
+    """Write what a stage made to a file of its own, whole or not at all; raises OSError where the disk refuses."""
+    arrays: dict[str, Any] = {}
+    tree = _pack(value, arrays)
+    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.partial.npz")
+    try:
+        np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), __stage__=np.array(stage), **arrays)
+        os.replace(partial, path)
+    except OSError:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
-        found = f"{target}: {error.strerror}"
-        raise OutputError("--save-stages", found, "choose a folder that can be written") from None
+        raise
 
 
 def clear_stages(folder: Path) -> None:
@@ -63,14 +83,19 @@ def clear_stages(folder: Path) -> None:
 def load_stage(folder: Path, stage: str) -> Any:
     """Read what `save_stage` wrote."""
     path = folder / f"{stage}.npz"
+    if not path.exists():
+        raise FigureError(path, "no such file", "run once with --save-stages and without --resume-from")
+    return read_result(path, stage)
+
+
+def read_result(path: Path, stage: str) -> Any:
+    """Read what `write_result` wrote. Raises FigureError for a file that is damaged, or of another stage."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             if str(archive["__stage__"]) != stage:
                 raise ValueError(f"it holds {archive['__stage__']}")
             return _unpack(json.loads(str(archive["__tree__"])), archive, _classes())
-    except FileNotFoundError:
-        raise FigureError(path, "no such file", "run once with --save-stages and without --resume-from") from None
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         found = f"not a stage file of this version ({' '.join(str(error).split())[:80]})"
         raise FigureError(path, found, "run again with --save-stages and without --resume-from") from None
 

@@ -38,6 +38,20 @@ class Reading:
     confidence: FloatArray | None
 
 
+@dataclass(frozen=True)
+class Given:
+    """What the files of a figure give.
+
+    view : the figure's window of the picture; silhouette : (H, W) bool, None where no file has one; joints : in pixels
+    of the view, None without a file; part_labels : (H, W) uint8, 0 where nothing is said
+    """
+
+    view: View
+    silhouette: BoolArray | None
+    joints: Joints | None
+    part_labels: ByteArray
+
+
 def read_figure(
     path: Path,
     *,
@@ -77,41 +91,55 @@ def read_parsed(
     labels: bool = False,
 ) -> Reading:
     """As `read_figure`, with what it was inferred from; labels : infer part labels where none are given."""
+    given = read_given(path, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
+    view, silhouette, joints, known = given.view, given.silhouette, given.joints, given.part_labels
+    confidence, parts = None, known
+    if silhouette is None or joints is None or (labels and part_labels is None):
+        found = _inferred(path, view.rgba, silhouette)
+        silhouette = found.mask if silhouette is None else silhouette
+        if joints is None:
+            joints, confidence = Joints(found.joints_px, found.visible), found.confidence
+        if part_labels is None:
+            parts = found.part_labels
+    figure = Figure(
+        name=name or path.stem,
+        rgba=view.rgba,
+        mask=silhouette,
+        joints_px=np.clip(joints.points_px, 0, np.array(silhouette.shape[::-1], np.float32)),
+        visible=joints.visible,
+        part_labels=np.where(silhouette, known, 0),
+        depth_order=joints.depth_order,
+        origin_px=(float(view.corner[0]), float(view.corner[1])),
+    )
+    return Reading(figure, view, parts, confidence)
+
+
+def read_given(
+    path: Path,
+    *,
+    mask: Path | None = None,
+    keypoints: Path | None = None,
+    part_labels: Path | None = None,
+    bbox: tuple[int, int, int, int] | None = None,
+) -> Given:
+    """What the files of a figure give; nothing is inferred. Parameters and errors as of `read_figure`."""
     view = read_view(path, bbox)
     silhouette = read_mask(mask, view)
-    given = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
+    joints = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
     shape = view.rgba.shape[:2]
     known = np.zeros(shape, np.uint8) if part_labels is None else read_labels(part_labels, view)
     if silhouette is not None and not silhouette.any():
         where = mask if mask is not None else path
         raise FigureError(where, "the silhouette is empty", "the figure must be opaque, or bright in --mask")
-    confidence, parts = None, known
-    if silhouette is None or given is None or (labels and part_labels is None):
-        found = _inferred(path, view.rgba, silhouette)
-        silhouette = found.mask if silhouette is None else silhouette
-        if given is None:
-            given, confidence = Joints(found.joints_px, found.visible), found.confidence
-        if part_labels is None:
-            parts = found.part_labels
-    size = np.array(shape[::-1], np.float32)
-    outside = ((given.points_px < -JOINT_SLACK_PX) | (given.points_px > size + JOINT_SLACK_PX)).any(axis=1)
-    if outside.any():
-        index = int(np.argmax(outside))
-        x, y = given.points_px[index]
-        said = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
-        where = keypoints if keypoints is not None else path
-        raise FigureError(where, said, "move it inside, or pass the joints that belong to this picture")
-    figure = Figure(
-        name=name or path.stem,
-        rgba=view.rgba,
-        mask=silhouette,
-        joints_px=np.clip(given.points_px, 0, size),
-        visible=given.visible,
-        part_labels=np.where(silhouette, known, 0),
-        depth_order=given.depth_order,
-        origin_px=(float(view.corner[0]), float(view.corner[1])),
-    )
-    return Reading(figure, view, parts, confidence)
+    if joints is not None:
+        size = np.array(shape[::-1], np.float32)
+        outside = ((joints.points_px < -JOINT_SLACK_PX) | (joints.points_px > size + JOINT_SLACK_PX)).any(axis=1)
+        if outside.any():
+            index = int(np.argmax(outside))
+            x, y = joints.points_px[index]
+            said = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
+            raise FigureError(keypoints, said, "move it inside, or pass the joints that belong to this picture")
+    return Given(view, silhouette, joints, known)
 
 
 def joints_of_view(path: Path, view: View, picture: Path, bbox: tuple[int, int, int, int] | None) -> Joints:

@@ -12,8 +12,9 @@ from typing import Any
 
 from PIL import ImageColor
 
+from fig2mesh.convert import torch_device
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.job import check_text, configure_logging, torch_device, write_text
+from fig2mesh.job import check_text, configure_logging, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import ByteArray, Figure
 from fig2mesh.render.counts import Counts
@@ -149,7 +150,7 @@ def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldSc
     from fig2mesh.parts.smooth_union import smooth_union
     from fig2mesh.pipeline import make_only, steps
 
-    figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
     textures = needs(request.mode, request.effects).textures
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}
     make_only("textures" if textures else "body", steps(settings, 1.0), results)

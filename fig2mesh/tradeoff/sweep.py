@@ -91,7 +91,7 @@ def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
 
     seconds: dict[str, float] = {}
     try:
-        drawn, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+        drawn, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
         results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
         for step in steps(settings, FIGURE_HEIGHT):
             start = time.perf_counter()

@@ -6,8 +6,9 @@ import logging
 from pathlib import Path
 from typing import Any
 
+from fig2mesh.convert import torch_device
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.job import check_text, configure_logging, progress, tell, torch_device, write_text
+from fig2mesh.job import check_text, configure_logging, progress, tell, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.place import PlaceRequest, open_map, place
 from fig2mesh.records import Figure
@@ -89,7 +90,7 @@ def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any =
     from fig2mesh.parts.pieces import clean
     from fig2mesh.pipeline import make_only, steps
 
-    figure, pieces, _ = clean(figure, settings.voxel, 2 * max(settings.texture_size, 1024))
+    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}
     make_only("textures", steps(settings, height_m), results, advance)
     lift, body, sources = results["lift"], results["body"], results["textures"]
