@@ -38,8 +38,8 @@ class PlacedFigure:
     parts : names of its body parts
     shares : per part, the share of its surface that the drawing itself showed; empty if unknown
     observed : the same share for the whole surface; None if unknown
-    attributes : further columns of the table that the figure is a row of, such as artist and year; a mapping or pairs
-        of name and value, kept as `plain_attributes` of it. Figures of one table have the same columns, in one order
+    attributes : further columns of the table that the figure is a row of, such as artist and year: pairs of name and
+        value, kept as `plain_attributes` of them. Figures of one table have the same columns, in one order
     """
 
     name: str
