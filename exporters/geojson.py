@@ -5,6 +5,8 @@ https://www.rfc-editor.org/rfc/rfc7946
 
 from __future__ import annotations
 
+import functools
+import itertools
 import json
 from collections.abc import Iterable
 from dataclasses import replace
@@ -17,14 +19,30 @@ from exporters.glb import write_glb
 from exporters.placed_figure import PlacedFigure, figure_of
 from exporters.profiles import GENERAL, Profile
 
+OWN_PROPERTIES: dict[str, type] = {
+    "name": str,
+    "source": str,
+    "credit": str,
+    "heading_deg": float,
+    "figure_height_m": float,
+    "height_m": float,
+    "height_datum": str,
+    "altitude_mode": str,
+    "observed_share": float,
+    "parts": str,
+    "model": str,
+}
+"""What a feature says of its figure before the columns of the user's table, in order; any may be None."""
+
 
 def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
-    """A figure as a Feature with a Point.
+    """A figure as a Feature with a Point; its properties are `OWN_PROPERTIES` and then the figure's attributes.
 
     model : path of its model as seen from the file, None without one
 
     The third coordinate is the height above the ellipsoid, as RFC 7946 has it. A figure that stands on whatever
     terrain there is has no such height: its `height_m` is above the terrain, and its point has two coordinates.
+    An attribute whose name is taken gets another, see `free_names`.
     """
     place = figure.placement
     clamped = place.altitude_mode == "clamp"
@@ -41,6 +59,8 @@ def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
         "parts": ", ".join(figure.parts) or None,  # text: GIS tables have no lists
         "model": quote(model) if model else None,
     }
+    names = free_names(tuple(name for name, _ in figure.attributes), tuple(OWN_PROPERTIES))
+    properties |= {name: value for name, (_, value) in zip(names, figure.attributes, strict=True)}
     coordinates = [place.lon_deg, place.lat_deg, *([] if clamped else [place.height_m])]
     return {
         "type": "Feature",
@@ -48,6 +68,29 @@ def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
         # Every feature has the same attributes: tables are made from the first one.
         "properties": properties,
     }
+
+
+@functools.lru_cache(maxsize=64)
+def free_names(names: tuple[str, ...], taken: tuple[str, ...]) -> tuple[str, ...]:
+    """The names of columns, those that are taken with `_2` at their end, or the first number that is free.
+
+    Capital and small letters count as the same, as tables of SQL have it: `Name` beside `name` becomes `Name_2`. A
+    name met twice is taken the second time; a column that needs no number keeps its name whatever comes before it. An
+    empty name becomes `column`.
+    """
+    used = {name.casefold() for name in taken}
+    found = list(names)
+    clashing = []
+    for index, name in enumerate(names):
+        if not name or name.casefold() in used:
+            clashing.append(index)
+        used.add(name.casefold())
+    for index in clashing:
+        base = names[index] or "column"
+        candidates = itertools.chain([base], (f"{base}_{number}" for number in itertools.count(2)))
+        found[index] = next(each for each in candidates if each.casefold() not in used)
+        used.add(found[index].casefold())
+    return tuple(found)
 
 
 def write_geojson(asset: Asset, path: Path, profile: Profile = GENERAL) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -16,6 +19,8 @@ from georef.geodesy import ecef_from_tile, tile_from_asset
 from georef.placement import GeoPlacement
 
 Vector = tuple[float, float, float]
+Value = str | int | float | bool | None
+Attributes = tuple[tuple[str, Value], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +38,8 @@ class PlacedFigure:
     parts : names of its body parts
     shares : per part, the share of its surface that the drawing itself showed; empty if unknown
     observed : the same share for the whole surface; None if unknown
+    attributes : further columns of the table that the figure is a row of, such as artist and year: pairs of name and
+        value, kept as `plain_attributes` of them. Figures of one table have the same columns, in one order
     """
 
     name: str
@@ -46,10 +53,42 @@ class PlacedFigure:
     parts: tuple[str, ...] = ()
     shares: tuple[float, ...] = ()
     observed: float | None = None
+    attributes: Attributes = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "attributes", plain_attributes(self.attributes))
         if not self.contents or len(self.contents) != len(self.errors):
             raise ValueError(f"{self.name}: {len(self.contents)} contents with {len(self.errors)} errors")
+
+
+def plain_attributes(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> Attributes:
+    """Names and values as every index can hold them: text, whole number, number, yes or no, or None.
+
+    NumPy's scalars become Python's. A number that is not finite becomes None, as tables write missing numbers as NaN
+    and JSON has neither. Of text goes what UTF-8 (halves of surrogate pairs) or SQLite (NUL) cannot hold.
+
+    Raises ValueError for a value of another type.
+    """
+    pairs = given.items() if isinstance(given, Mapping) else given
+    return tuple((_plain_text(str(name)), _plain(name, value)) for name, value in pairs)
+
+
+def _plain(name: str, value: Any) -> Value:
+    if value is None:
+        return None
+    if isinstance(value, str):
+        return _plain_text(value)
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return float(value) if math.isfinite(value) else None
+    raise ValueError(f"attribute {name!r} is of type {type(value).__name__}")
+
+
+def _plain_text(text: str) -> str:
+    return text.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
 
 
 def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:

@@ -1,0 +1,107 @@
+"""Rows of a table whose columns are known only when the last row has been seen; memory holds a chunk of them."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exporters.placed_figure import Value
+
+CHUNK_ROWS = 4096
+"""Rows in memory at a time; at about 1 kB each they stay below 10 MB, and a database commits once a chunk."""
+
+IN_MEMORY_BYTES = 1 << 22
+"""Up to this size chunks are kept in memory; beyond it they go to the disk."""
+
+KINDS: tuple[type, ...] = (bool, int, float, str)
+"""Kinds of columns; each can hold the values of those before it."""
+
+Rows = list[tuple[Any, dict[str, Value]]]
+
+
+class TableSpool:
+    """Rows in order, kept in chunks on the disk, and what the columns of all of them are.
+
+    columns : name → kind, in the order in which names are met. A column that holds numbers and text is text, one of
+        nothing but None too, and whole numbers beyond 64 bits are text. Names that differ only in capital and small
+        letters are one column, as in SQL; the first spelling counts
+    """
+
+    def __init__(self, folder: Path, columns: Mapping[str, type] | None = None) -> None:
+        """folder : where the temporary file goes; columns : those that are there even without rows, with a kind that
+        does not change."""
+        self.rows = 0
+        self._kinds: dict[str, int] = {name: KINDS.index(kind) for name, kind in (columns or {}).items()}
+        self._fixed = frozenset(self._kinds)
+        self._spellings = {name.casefold(): name for name in self._kinds}
+        self._chunk: Rows = []
+        self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY_BYTES, dir=str(folder))  # noqa: SIM115  closed by __exit__
+
+    def __enter__(self) -> TableSpool:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    @property
+    def columns(self) -> dict[str, type]:
+        """See the class."""
+        return {name: str if kind < 0 else KINDS[kind] for name, kind in self._kinds.items()}
+
+    def add(self, key: Any, values: Mapping[str, Value]) -> None:
+        """Append a row; key : whatever belongs to it beside the columns, such as its geometry."""
+        row: dict[str, Value] = {}
+        for name, value in values.items():
+            column = self._spellings.setdefault(name.casefold(), name)
+            row[column] = value
+            if column not in self._fixed:
+                self._kinds[column] = max(self._kinds.get(column, -1), _kind(value))
+        self._chunk.append((key, row))
+        self.rows += 1
+        if len(self._chunk) == CHUNK_ROWS:
+            self._flush()
+
+    def chunks(self) -> Iterator[Rows]:
+        """The rows in order, some at a time; once all of them are added."""
+        self._flush()
+        end = self._file.tell()
+        self._file.seek(0)
+        while self._file.tell() < end:
+            yield pickle.load(self._file)
+
+    def _flush(self) -> None:
+        if self._chunk:
+            pickle.dump(self._chunk, self._file, pickle.HIGHEST_PROTOCOL)
+            self._chunk = []
+
+
+def _kind(value: Value) -> int:
+    """Index in KINDS of the least kind of column that holds a value; -1 for None, which any holds."""
+    if value is None:
+        return -1
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        return KINDS.index(str)
+    return KINDS.index(type(value))
+
+
+def column_arrays(values: list[Value], kind: type) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
+    """Values of a column as an array, (N,) bool, int64, float64 or object of str, and where they are None.
+
+    The mask is None for text, which has its None in the array itself, and for a column without None.
+    """
+    if kind is str:
+        text = [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]
+        return np.array(text, dtype=object), None
+    empty = np.array([value is None for value in values], dtype=np.bool_)
+    dtype = {bool: np.bool_, int: np.int64, float: np.float64}[kind]
+    return np.array([0 if value is None else value for value in values], dtype=dtype), empty if empty.any() else None

@@ -1,0 +1,65 @@
+"""Dates as people write them, as spans of time: a year is as long as a year.
+
+https://www.rfc-editor.org/rfc/rfc3339
+"""
+
+from __future__ import annotations
+
+import re
+from calendar import monthrange
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from exporters.errors import ExportError
+
+_DAY = re.compile(r"(\d{4})(?:-(\d\d)(?:-(\d\d))?)?", re.ASCII)
+_MOMENT = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d(\.\d+)?)?([Zz]|[+-]\d\d:?\d\d)?", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSpan:
+    """From the first to the last moment, both in UTC; the same one for a moment."""
+
+    start: datetime
+    end: datetime
+
+
+def time_span(text: str, source: str = "date") -> TimeSpan:
+    """The span of time that an ISO 8601 date means.
+
+    text : a year, "1893", a month, "1893-05", a day, "1893-05-17", a moment, "1893-05-17T12:00:00Z" (without an offset
+        it is UTC), or from the first moment of one to the last of another, "1893/1895"
+    source : where it comes from, for the error message
+
+    A year, month or day ends one second before the next.
+
+    Raises ExportError for anything else, as "around 1893", and for an end before its start.
+    """
+    try:
+        spans = [_span(part.strip()) for part in text.split("/", 1)]
+        found = TimeSpan(spans[0].start, spans[-1].end)
+    except (ValueError, OverflowError) as error:
+        remedy = "give a date such as 1893, 1893-05-17 or 1893/1895, or a moment such as 2024-05-17T12:00:00Z"
+        raise ExportError(source, f"{text!r} is no date of ISO 8601", remedy) from error
+    if found.end < found.start:
+        raise ExportError(source, f"{text!r} ends before it starts", "give the earlier date first")
+    return found
+
+
+def _span(text: str) -> TimeSpan:
+    if match := _DAY.fullmatch(text):
+        year, month, day = int(match[1]), int(match[2] or 0), int(match[3] or 0)
+        last_month = month or 12
+        last_day = day or monthrange(year, last_month)[1]
+        end = datetime(year, last_month, last_day, 23, 59, 59, tzinfo=UTC)
+        return TimeSpan(datetime(year, month or 1, day or 1, tzinfo=UTC), end)
+    if not _MOMENT.fullmatch(text):
+        raise ValueError(text)
+    moment = datetime.fromisoformat(text.upper())
+    moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+    return TimeSpan(moment, moment)
+
+
+def stamp(moment: datetime) -> str:
+    """A moment in UTC as RFC 3339 has it, with a Z."""
+    return moment.isoformat().replace("+00:00", "Z")
