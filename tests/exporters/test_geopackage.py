@@ -149,6 +149,8 @@ def test_rows_keep_their_order_over_chunks(tmp_path: Path, count: int) -> None:
     assert [row["row"] for row in _rows(path, "failed")] == list(range(count))
     with closing(sqlite3.connect(path)) as database:
         assert database.execute("PRAGMA integrity_check").fetchall() == [("ok",)]
+        assert database.execute("PRAGMA foreign_key_check").fetchall() == []
+        assert database.execute("PRAGMA application_id").fetchall() == [(int.from_bytes(b"GPKG"),)]
         assert database.execute("SELECT count(*) FROM rtree_figures_geom").fetchall() == [(count,)]
         assert database.execute("SELECT feature_count FROM gpkg_ogr_contents").fetchall() == [(count,), (count,)]
 
