@@ -74,11 +74,11 @@ def plain_attributes(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> At
 
 
 def _plain(name: str, value: Any) -> Value:
-    if value is None:
-        return None
+    if value is None or type(value) in (bool, int):
+        return value  # type: ignore[no-any-return]
     if isinstance(value, str):
         return _plain_text(value)
-    if isinstance(value, bool | np.bool_):
+    if isinstance(value, np.bool_):
         return bool(value)
     if isinstance(value, Integral):
         return int(value)
@@ -88,6 +88,8 @@ def _plain(name: str, value: Any) -> Value:
 
 
 def _plain_text(text: str) -> str:
+    if text.isascii() and "\0" not in text:
+        return str(text)  # a plain one
     return text.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
 
 

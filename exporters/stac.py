@@ -156,7 +156,8 @@ def write_stac(
     stand as they are, other characters are percent-encoded. `fig2mesh` gives names without such characters, because
     PySTAC takes references between files on a disk for plain paths.
 
-    Raises ExportError for a date that is none, and ValueError for a license that is no identifier.
+    Raises ExportError for a date that is none, ValueError for a license that is no identifier, and OSError where the
+    disk refuses.
     """
     if not re.fullmatch(r"[\w.+-]+", license):
         raise ValueError(f"license {license!r} is no identifier")

@@ -41,6 +41,7 @@ class TableSpool:
         self.rows = 0
         self._kinds: dict[str, int] = {name: KINDS.index(kind) for name, kind in (columns or {}).items()}
         self._fixed = frozenset(self._kinds)
+        self._columns: dict[str, str] = {}
         self._spellings = {name.casefold(): name for name in self._kinds}
         self._chunk: Rows = []
         self._file = tempfile.SpooledTemporaryFile(max_size=IN_MEMORY_BYTES, dir=str(folder))  # noqa: SIM115  closed by __exit__
@@ -62,7 +63,9 @@ class TableSpool:
         """Append a row; key : whatever belongs to it beside the columns, such as its geometry."""
         row: dict[str, Value] = {}
         for name, value in values.items():
-            column = self._spellings.setdefault(name.casefold(), name)
+            column = self._columns.get(name)
+            if column is None:
+                column = self._columns[name] = self._spellings.setdefault(name.casefold(), name)
             row[column] = value
             if column not in self._fixed:
                 self._kinds[column] = max(self._kinds.get(column, -1), _kind(value))

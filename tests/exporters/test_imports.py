@@ -9,7 +9,7 @@ from pathlib import Path
 import exporters
 from tests.node import ROOT
 
-HEAVY = ("torch", "open3d", "pxr", "trimesh", "pygltflib", "scipy", "pyproj", "PIL", "fig2mesh")
+HEAVY = ("torch", "open3d", "pxr", "trimesh", "pygltflib", "scipy", "pyproj", "pyogrio", "PIL", "fig2mesh")
 
 
 def test_importing_every_module_imports_nothing_heavy() -> None:
