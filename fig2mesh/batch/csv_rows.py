@@ -184,11 +184,12 @@ def _header(path: Path, lines: _Lines) -> tuple[list[str], str]:
                 break
         tried = {separator: _names(lines, separator) for separator in separators}
         separator = max(tried, key=lambda each: (FIGURE in tried[each], len(tried[each])))
+        if FIGURE not in tried[separator] and not all(tried.values()):
+            raise InputError(path, "a quote in its first line that does not close", "close it")
+        lines.begin()
         next(_table(lines, separator))
     except _TooLong:
         raise InputError(path, f"its first line is longer than {MAX_RECORD:,} characters", NO_TABLE) from None
-    except csv.Error as error:
-        raise InputError(path, f"{_unquoted(error).finding} in its first line", "close the quotes") from None
     names = tried[separator]
     check_columns(path, names)
     return names, separator

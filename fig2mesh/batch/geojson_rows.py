@@ -41,6 +41,10 @@ MAX_QUIET = 1 << 20
 MAX_LINE = 1 << 24
 """Bytes of a feature on a line of its own, with an outline of hundreds of thousands of vertices."""
 
+MAX_DIGITS = 640
+"""Digits in a row: the fewest that Python can be told to refuse (`sys.set_int_max_str_digits`). What it refuses is
+not only no number: the parser of ijson in C (3.6) goes on with a null pointer after it."""
+
 CHUNK = 1 << 16
 
 BOM = b"\xef\xbb\xbf"
@@ -64,9 +68,12 @@ TWICE = Unfit("given twice", "give it once")
 
 JSON = "give valid JSON in UTF-8, with null for NaN"
 
-BROKEN = (ijson.JSONError, ValueError, ArithmeticError, SystemError, RecursionError)
-"""What the parsers of ijson raise for bytes that are not JSON: SystemError is what the one in C makes of an integer of
-more digits than Python converts, ValueError what the one in Python makes of broken texts."""
+BROKEN = (ijson.JSONError, ValueError, ArithmeticError)
+"""What the parsers of ijson raise for bytes that are not JSON: ValueError for texts that are not Unicode,
+ArithmeticError for exponents beyond all measure."""
+
+_DIGITS = bytes(ord("0") if chr(code).isdecimal() and code < 128 else ord(" ") for code in range(256))
+_TOO_MANY = b"0" * (MAX_DIGITS + 1)
 
 
 class _NotJson(Exception):
@@ -79,12 +86,17 @@ class _Source:
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
         self._quiet = 0
+        self._digits = b""
 
     def read(self, size: int = -1) -> bytes:
         data = self._stream.read(size)
         self._quiet += len(data)
         if self._quiet > MAX_QUIET + CHUNK:
             raise _NotJson(f"more than {MAX_QUIET:,} bytes without a new value")
+        digits = self._digits + data.translate(_DIGITS)
+        if _TOO_MANY in digits:
+            raise _NotJson(f"a number of more than {MAX_DIGITS} digits")
+        self._digits = digits[-MAX_DIGITS:]
         return data
 
     def events(self) -> Events:
@@ -96,8 +108,6 @@ class _Source:
         except BROKEN as error:
             found = error.args[0] if error.args else type(error).__name__
             text = found.decode("utf-8", "replace") if isinstance(found, bytes) else str(found)
-            if isinstance(error, SystemError):
-                text = "a number of too many digits"
             raise _NotJson(shown(text.partition("\n")[0].strip(), 100)) from None
 
 
@@ -260,8 +270,9 @@ def _document(path: Path, stream: BinaryIO, start: int) -> Iterator[Row]:
                 for event, value in events:
                     if event == "end_array":
                         break
+                    feature = _item(events, (event, value))
                     number += 1
-                    yield _item(events, (event, value)).row(number, f"feature {number}")
+                    yield feature.row(number, f"feature {number}")
             else:
                 top.member(key, events)
                 if key == "type" and top.kind not in ("FeatureCollection", "Feature"):
@@ -269,7 +280,7 @@ def _document(path: Path, stream: BinaryIO, start: int) -> Iterator[Row]:
             if key in ("crs", "features"):
                 top.seen.add(key)
     except _NotJson as error:
-        raise InputError(path, f"feature {number + 1} or what follows it is not JSON ({error})", JSON) from None
+        raise InputError(path, f"{f'after feature {number}, ' if number else ''}not JSON ({error})", JSON) from None
     if "features" not in top.seen:
         if top.kind != "Feature":
             raise InputError(path, "no features", "give a GeoJSON FeatureCollection")
