@@ -1,0 +1,1 @@
+"""Map collections: many figures, one row of a table each."""
