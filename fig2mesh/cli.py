@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from fig2mesh import __version__, annotate_cli, globe_cli, parse_cli, render_cli, tileset_cli, view_cli
+from fig2mesh import __version__, annotate_cli, batch_cli, globe_cli, parse_cli, render_cli, tileset_cli, view_cli
 from fig2mesh.figure_options import FILE, figure_files, messages, place_options
 from fig2mesh.settings import EFFECTS
 from fig2mesh.tradeoff_cli import tradeoff
@@ -201,6 +201,7 @@ def doctor() -> None:
 parse_cli.add_to(cli)
 render_cli.add_to(cli)
 view_cli.add_to(cli)
+batch_cli.add_to(cli, make)
 tileset_cli.add_to(cli)
 annotate_cli.add_to(cli)
 globe_cli.add_to(cli)

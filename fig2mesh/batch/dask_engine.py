@@ -1,0 +1,190 @@
+"""Workers of a Dask cluster. All machines see the files and the folder of the outputs under the same paths.
+
+https://distributed.dask.org/en/stable/
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import secrets
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, Final
+
+from fig2mesh.batch.engine import Stage, lost
+from fig2mesh.batch.ledger import WORK
+from fig2mesh.batch.row_job import Batch, Outcome, Task, check_row, convert_row
+from fig2mesh.errors import InputError
+
+TOPIC: Final = "fig2mesh"
+
+AHEAD: Final = 2
+"""Rows handed out for each thread of a worker: one to work on, one that waits, so that none has to ask."""
+
+ANSWER_S: Final = 15.0
+"""How long a scheduler may take to answer at first."""
+
+WORKERS_S: Final = 60.0
+"""How long to wait for the first worker."""
+
+_one_at_a_time = threading.Lock()
+"""A worker with several threads gives them all to one row: memory is that of a row."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a worker says of itself. code : see `keys.fingerprint`; sees : whether it sees the folder."""
+
+    code: str
+    sees: bool
+    threads: int
+
+
+class DaskEngine:
+    """The workers of the scheduler at `address`; dry : rows are only checked.
+
+    Raises InputError where there is no scheduler or no worker, or a worker would make something else: another version,
+    or another disk.
+    """
+
+    def __init__(self, batch: Batch, address: str, dry: bool = False) -> None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise InputError("--engine dask", "not installed", 'run: pip install "fig2mesh[cluster]"') from None
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        self._batch, self._dry = batch, dry
+        self._address = address
+        remedy = "start one with: dask scheduler; see the README"
+        try:
+            self._client: Any = Client(address, timeout=ANSWER_S, set_as_default=False)
+        except (OSError, TimeoutError, ValueError, ImportError) as error:
+            reason = " ".join(str(error).split())[:120] or type(error).__name__
+            raise InputError(f"--address {address}", f"no scheduler answers ({reason})", remedy) from None
+        try:
+            self._check()
+        except BaseException:
+            self._client.close()
+            raise
+
+    def _check(self) -> None:
+        from fig2mesh.batch.keys import fingerprint
+
+        with suppress(TimeoutError):
+            self._client.wait_for_workers(1, timeout=WORKERS_S)
+        token = secrets.token_hex(8)
+        mark = self._batch.folder / WORK / f"token-{token}"
+        mark.parent.mkdir(parents=True, exist_ok=True)
+        mark.touch()
+        try:
+            found = self._client.run(_facts, str(mark), on_error="return")
+        finally:
+            mark.unlink(missing_ok=True)
+        if not found:
+            raise InputError(f"--address {self._address}", "it has no worker", f"run: dask worker {self._address}")
+        for worker, facts in found.items():
+            if not isinstance(facts, Facts):
+                reason = " ".join(str(facts).split())[:120]
+                raise InputError(
+                    f"worker {worker}", f"cannot run fig2mesh ({reason})", "install the same version there"
+                )
+            if facts.code != fingerprint():
+                raise InputError(f"worker {worker}", "has another version of fig2mesh or of a library",
+                                 "install the same versions there")  # fmt: skip
+            if not facts.sees:
+                raise InputError(f"worker {worker}", f"does not see {self._batch.folder}",
+                                 "give -o DIR on a disk that all machines share, under the same path")  # fmt: skip
+        self._threads: int = sum(facts.threads for facts in found.values())
+
+    @property
+    def workers(self) -> int:
+        """Threads of all workers."""
+        return self._threads
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
+        """See `Engine.run`; stages are told by the scheduler's events."""
+        from distributed import as_completed
+
+        stages: queue.SimpleQueue[Stage] = queue.SimpleQueue()
+        self._client.subscribe_topic(TOPIC, lambda event: stages.put(Stage(*event[1])))
+        waiting = iter(tasks)
+        given: dict[str, Task] = {}
+        ended = as_completed(with_results=False)
+        try:
+            for task in waiting:
+                ended.add(self._submit(task, given))
+                if len(given) >= AHEAD * max(self._threads, 1):
+                    break
+            for future in ended:
+                task = given.pop(future.key)
+                while not stages.empty():
+                    yield stages.get()
+                yield self._outcome(future, task)
+                future.release()
+                following = next(waiting, None)
+                if following is not None:
+                    ended.add(self._submit(following, given))
+        except (OSError, TimeoutError) as error:
+            reason = " ".join(str(error).split())[:120] or type(error).__name__
+            raise InputError(f"--address {self._address}", f"the scheduler is lost ({reason})",
+                             "start it and its workers, and run the same command again") from None  # fmt: skip
+        finally:
+            with suppress(Exception):
+                self._client.unsubscribe_topic(TOPIC)
+            self._client.close()
+
+    def _submit(self, task: Task, given: dict[str, Task]) -> Any:
+        key = f"fig2mesh-{task.number}-{secrets.token_hex(4)}"
+        given[key] = task
+        # Lower numbers first; a row whose worker is lost comes again before those that were never begun.
+        return self._client.submit(_row, self._batch, task, self._dry, key=key, pure=False, priority=-task.number)
+
+    def _outcome(self, future: Any, task: Task) -> Outcome:
+        if future.status == "finished":
+            found = future.result()
+            assert isinstance(found, Outcome)
+            return found
+        if future.status != "error":
+            raise OSError(f"a row is {future.status}")
+        error = future.exception()
+        if type(error).__name__ == "KilledWorker":
+            return lost(task, "the workers that had it died; look at their logs")
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        return lost(task, f"lost by the cluster: {text}")
+
+
+def _facts(mark: str) -> Facts:
+    from distributed import get_worker
+
+    from fig2mesh.batch.keys import fingerprint
+
+    return Facts(fingerprint(), os.path.exists(mark), get_worker().state.nthreads)
+
+
+def _row(batch: Batch, task: Task, dry: bool) -> Outcome:
+    """One row in a worker of the cluster."""
+    from distributed import get_worker
+
+    worker = get_worker()
+
+    def advance(stage: str) -> None:
+        # A tuple of plain values: the scheduler keeps events, and knows nothing of our classes.
+        worker.log_event(TOPIC, (str(worker.name), task.number, task.name, stage))
+
+    with _one_at_a_time, _threads(worker.state.nthreads):
+        return check_row(batch, task) if dry else convert_row(batch, task, advance)
+
+
+def _threads(count: int) -> Any:
+    """Libraries compute on as many threads as the worker has."""
+    import numba
+    import torch
+    from threadpoolctl import threadpool_limits
+
+    torch.set_num_threads(count)
+    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    return threadpool_limits(count)

@@ -1,0 +1,167 @@
+"""Worker processes of this machine, one row at a time each; networks stay loaded from row to row."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any, Final
+
+from fig2mesh.batch.engine import Stage, lost
+from fig2mesh.batch.row_job import Batch, Outcome, Task, check_row, convert_row
+
+THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
+                  "VIPS_CONCURRENCY")  # fmt: skip
+
+TRIES: Final = 2
+"""A row whose worker died is tried again; if that one dies too, the row is at fault, or the machine too small."""
+
+PARENT_S: Final = 1.0
+"""How often a worker looks whether its parent is still there."""
+
+
+@dataclass
+class _Worker:
+    process: Any
+    pipe: Connection
+    task: Task | None = None
+    since: float = 0.0
+
+
+class LocalEngine:
+    """`jobs` processes; timeout_s : longest that a row may take; dry : rows are only checked."""
+
+    def __init__(self, batch: Batch, jobs: int, timeout_s: float, dry: bool = False) -> None:
+        self._batch, self._jobs, self._timeout_s, self._dry = batch, jobs, timeout_s, dry
+
+    @property
+    def workers(self) -> int:
+        """Number of processes."""
+        return self._jobs
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
+        """See `Engine.run`."""
+        queue = iter(tasks)
+        again: list[Task] = []
+        deaths: dict[int, int] = {}
+        workers: list[_Worker] = []
+
+        def give(worker: _Worker) -> bool:
+            task = again.pop() if again else next(queue, None)
+            worker.task = task
+            if task is None:
+                return False
+            worker.since = time.monotonic()
+            with suppress(OSError):  # one that died meanwhile is found by its pipe
+                worker.pipe.send(task)
+            return True
+
+        try:
+            for _ in range(self._jobs):
+                worker = self._start()
+                workers.append(worker)
+                if not give(worker):
+                    break
+            while busy := [worker for worker in workers if worker.task is not None]:
+                for ready in wait([worker.pipe for worker in busy], timeout=1.0):
+                    worker = next(each for each in busy if each.pipe is ready)
+                    task = worker.task
+                    assert task is not None
+                    try:
+                        message = worker.pipe.recv()
+                    except (EOFError, OSError):
+                        workers.remove(worker)
+                        code = self._end(worker)
+                        deaths[task.number] = deaths.get(task.number, 0) + 1
+                        if deaths[task.number] < TRIES:
+                            again.append(task)
+                        else:
+                            yield _died(task, code)
+                        workers.append(self._start())
+                        give(workers[-1])
+                        continue
+                    if isinstance(message, Outcome):
+                        give(worker)
+                        yield message
+                    else:
+                        yield Stage(str(worker.process.pid), task.number, task.name, message)
+                for worker in busy:
+                    task = worker.task
+                    if task is not None and time.monotonic() - worker.since > self._timeout_s and worker in workers:
+                        workers.remove(worker)
+                        worker.process.kill()
+                        self._end(worker)
+                        yield lost(task, f"took more than {self._timeout_s:g} s; raise --timeout")
+                        workers.append(self._start())
+                        give(workers[-1])
+        finally:
+            for worker in workers:
+                if worker.task is not None:
+                    worker.process.kill()
+                with suppress(OSError):
+                    worker.pipe.close()
+            for worker in workers:
+                worker.process.join(5)
+
+    def _start(self) -> _Worker:
+        ours, theirs = multiprocessing.Pipe()
+        context = multiprocessing.get_context("spawn")
+        threads = max(1, (os.cpu_count() or 1) // self._jobs)
+        # Libraries read these when they are loaded, so they are set before a process begins.
+        with _environment({name: os.environ.get(name, str(threads)) for name in THREADS}):
+            process = context.Process(
+                target=_work, args=(theirs, self._batch, self._dry, os.getpid()), daemon=True, name="fig2mesh-worker"
+            )
+            process.start()
+        theirs.close()
+        return _Worker(process, ours)
+
+    @staticmethod
+    def _end(worker: _Worker) -> int:
+        worker.pipe.close()
+        worker.process.join()
+        return int(worker.process.exitcode or 0)
+
+
+def _died(task: Task, code: int) -> Outcome:
+    how = f"signal {-code}" if code < 0 else f"exit code {code}"
+    hint = "; it may have run out of memory: try fewer --jobs" if code == -signal.SIGKILL else ""
+    return lost(task, f"its worker ended with {how}, {TRIES} times{hint}")
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _work(pipe: Connection, batch: Batch, dry: bool, parent: int) -> None:
+    """The life of a worker: tasks in, stages and outcomes out, until the pipe is closed."""
+    # Ctrl-C reaches the whole group; the parent decides what becomes of it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    with suppress(EOFError, OSError):
+        while True:
+            task = pipe.recv()
+            pipe.send(check_row(batch, task) if dry else convert_row(batch, task, pipe.send))
+
+
+def _watch(parent: int) -> None:
+    """End with the parent, however it ended: a row nobody waits for must not be in the way of the next run."""
+    while os.getppid() == parent:
+        time.sleep(PARENT_S)
+    os._exit(1)

@@ -1,0 +1,187 @@
+"""What stands over all figures of a collection: manifest, tileset, indexes, catalogue; from the records alone."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import multiprocessing
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from fig2mesh.batch.ledger import WORK, Ledger
+from fig2mesh.batch.row_job import Task
+from fig2mesh.batch.tasks import read_spool
+
+MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
+
+REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "notes")
+"""What the manifest takes from the record of a row that is done."""
+
+
+@dataclass(frozen=True)
+class Collection:
+    """folder : of the outputs; spool : of the tasks; columns : of the user that the indexes carry, in order;
+    title : of the collection; visible_from_m : of the tileset."""
+
+    folder: Path
+    spool: Path
+    columns: tuple[str, ...]
+    title: str
+    visible_from_m: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """figures : on the globe; unplaced : converted without a place; failed : rows; written : files, none if all were
+    there; left : names of figures that an earlier collection had."""
+
+    figures: int
+    unplaced: int
+    failed: int
+    written: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+def summarise_apart(collection: Collection) -> Summary:
+    """`summarise` in a process of its own, whose memory (about 5 kB a figure) goes back when it ends."""
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return pool.submit(summarise, collection).result()
+
+
+def summarise(collection: Collection) -> Summary:
+    """Write what stands over all figures, whole or not at all; nothing where all of it is there already.
+
+    Raises ExportError where the disk refuses.
+    """
+    from exporters.placed_figure import PlacedFigure
+
+    folder, ledger = collection.folder, Ledger(collection.folder)
+    left = ledger.names()
+    digest = hashlib.sha256(json.dumps([collection.columns, collection.title, collection.visible_from_m]).encode())
+    figures: list[PlacedFigure] = []
+    dates: list[str] = []
+    failed = unplaced = 0
+    for task, record in _records(collection):
+        left.discard(task.name)
+        digest.update(json.dumps([_line(task, record), record.get("figure"), record.get("date")]).encode())
+        if record["status"] != "done":
+            failed += 1
+        elif record.get("figure") is None:
+            unplaced += 1
+        else:
+            figures.append(_figure(record["figure"], collection.columns))
+            dates.append(record["date"])
+    counts = (len(figures), unplaced, failed)
+    before = _before(folder)
+    if before["digest"] == digest.hexdigest() and _stand(folder, before["files"]):
+        return Summary(*counts, (), tuple(sorted(left)))
+    from exporters.write import write_whole
+
+    def fill(stage: Path) -> None:
+        _fill(stage, collection, figures, dates)
+
+    outdated = [name for name in before["files"] if not Path(name).is_absolute() and ".." not in Path(name).parts]
+    files = write_whole(folder, folder / MANIFEST, fill, overwrite=True, outdated=outdated)
+    names = [file.relative_to(folder).as_posix() for file in files]
+    own = {name: _sha256(folder / name) for name in names}
+    state = {"digest": digest.hexdigest(), "files": own}
+    _state_path(folder).write_text(json.dumps(state), encoding="utf-8")
+    return Summary(*counts, tuple(names), tuple(sorted(left)))
+
+
+def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Sequence[str]) -> None:
+    """Write all files into an empty folder."""
+    from exporters.geopackage import write_geopackage
+    from exporters.stac import StacFile, StacItem, stac_file, write_stac
+    from exporters.tileset_files import write_tree
+
+    with (stage / MANIFEST).open("w", encoding="utf-8", newline="\n") as stream:
+        for task, record in _records(collection):
+            stream.write(json.dumps(_line(task, record), ensure_ascii=False, allow_nan=False) + "\n")
+    write_geopackage(figures, stage / GEOPACKAGE, failed=_failures(collection))
+    if not figures:
+        return
+    write_tree(list(figures), stage, visible_from_m=collection.visible_from_m, name=TILESET)
+
+    def items() -> Iterator[StacItem]:
+        placed = zip(figures, dates, strict=True)
+        for task, record in _records(collection):
+            if record["status"] == "done" and record.get("figure") is not None:
+                figure, date = next(placed)
+                files = [
+                    StacFile(name, record["sizes"][name], sha256) for name, sha256 in sorted(record["outputs"].items())
+                ]
+                yield StacItem(figure, task.name, tuple(files), date)
+
+    over = [stac_file(stage, name) for name in (TILESET, "index.geojson", GEOPACKAGE)]
+    identifier = re.sub(r"[^\w.-]+", "-", collection.title).strip("-.") or "figures"
+    write_stac(items(), stage, id=identifier, title=collection.title, files=over)
+
+
+def _records(collection: Collection) -> Iterator[tuple[Task, dict[str, Any]]]:
+    ledger = Ledger(collection.folder)
+    for task in read_spool(collection.spool):
+        record = ledger.read(task.name) or {}
+        if record.get("status") not in ("done", "failed"):
+            record = {"status": "failed", "error": "its record is damaged; run the same command again"}
+        yield task, record
+
+
+def _failures(collection: Collection) -> Iterable[tuple[int, str, str]]:
+    for task, record in _records(collection):
+        if record["status"] == "failed":
+            yield task.number, task.name, str(record.get("error"))
+
+
+def _line(task: Task, record: dict[str, Any]) -> dict[str, Any]:
+    """A row of the manifest."""
+    facts = {"row": task.number, "where": task.where, "name": task.name, "title": task.title}
+    done = record["status"] == "done"
+    return {
+        **facts,
+        "status": record["status"],
+        "error": record.get("error"),
+        "seconds": record.get("seconds", 0.0),
+        **{name: record.get(name) if done else None for name in REPORTED},
+    }
+
+
+def _figure(facts: dict[str, Any], columns: tuple[str, ...]) -> Any:
+    from exporters.placed_figure import PlacedFigure
+    from georef.placement import GeoPlacement
+
+    known = dict(facts["attributes"])
+    tuples = {name: tuple(facts[name]) for name in ("low", "high", "contents", "errors", "parts", "shares")}
+    attributes = tuple((column, known.get(column)) for column in columns)
+    placement = GeoPlacement(**facts["placement"])
+    return PlacedFigure(**{**facts, **tuples, "placement": placement, "attributes": attributes})
+
+
+def _state_path(folder: Path) -> Path:
+    return folder / WORK / "summary.json"
+
+
+def _before(folder: Path) -> dict[str, Any]:
+    """What the last run wrote here; nothing where that is not known."""
+    with suppress(OSError, ValueError):
+        found = json.loads(_state_path(folder).read_text(encoding="utf-8"))
+        if isinstance(found, dict) and isinstance(found.get("files"), dict):
+            return {"digest": found.get("digest"), "files": found["files"]}
+    return {"digest": None, "files": {}}
+
+
+def _stand(folder: Path, files: dict[str, str]) -> bool:
+    try:
+        return all(_sha256(folder / name) == digest for name, digest in files.items())
+    except OSError:
+        return False
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
