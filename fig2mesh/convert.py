@@ -32,10 +32,10 @@ def _light(effects: tuple[str, ...]) -> bool | None:
 
 def torch_device(name: str) -> str:
     """The device that --device names: "cpu" or "cuda"."""
+    if name == "cpu":
+        return "cpu"  # torch takes seconds to load
     import torch
 
-    if name == "cpu":
-        return "cpu"
     available = torch.cuda.is_available()
     if name == "cuda" and not available:
         raise InputError("--device", "no usable CUDA device", "pass --device cpu or auto")

@@ -17,7 +17,8 @@ from typing import Any, Final
 
 from fig2mesh.batch.engine import Stage, lost
 from fig2mesh.batch.ledger import WORK
-from fig2mesh.batch.row_job import Batch, Outcome, Task, check_row, convert_row
+from fig2mesh.batch.row_job import check_row, convert_row
+from fig2mesh.batch.task import Batch, Outcome, Task
 from fig2mesh.errors import InputError
 
 TOPIC: Final = "fig2mesh"

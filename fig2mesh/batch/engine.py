@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from fig2mesh.batch.row_job import Outcome, Task
+from fig2mesh.batch.task import Outcome, Task
 
 
 @dataclass(frozen=True)

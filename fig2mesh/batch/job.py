@@ -17,9 +17,10 @@ from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.local_engine import LocalEngine
 from fig2mesh.batch.progress import Kind, Tally, watching
 from fig2mesh.batch.row_files import Roots
-from fig2mesh.batch.row_job import LASTING, Batch, Outcome
+from fig2mesh.batch.row_job import LASTING
 from fig2mesh.batch.row_options import OWN_COLUMNS, known_columns
 from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apart
+from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, read_spool, tasks_of, write_spool
 from fig2mesh.errors import InputError, OutputError
 

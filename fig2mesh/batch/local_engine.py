@@ -14,7 +14,8 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, Final
 
 from fig2mesh.batch.engine import Stage, lost
-from fig2mesh.batch.row_job import Batch, Outcome, Task, check_row, convert_row
+from fig2mesh.batch.row_job import check_row, convert_row
+from fig2mesh.batch.task import Batch, Outcome, Task
 
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
                   "VIPS_CONCURRENCY")  # fmt: skip

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal, Protocol, TextIO
 
 from fig2mesh.batch.engine import Stage
-from fig2mesh.batch.row_job import Outcome
+from fig2mesh.batch.task import Outcome
 
 log = logging.getLogger("fig2mesh")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import stat
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -22,19 +23,22 @@ class Roots:
 
     def resolve(self, column: str, path: Path) -> Path:
         """The file a row means. Raises InputError where it is outside of `root`, through links too."""
-        whole = self.base / path
+        whole, shown = self.base / path, str(path)[:120]
         try:
             real = Path(os.path.realpath(whole, strict=False))
-        except (OSError, ValueError) as error:  # loops of links; names with NUL
-            raise InputError(f"column {column}", f"{str(path)[:80]!r}: {error}", "check the path") from None
-        if not real.is_relative_to(self.root):
-            link = "" if Path(os.path.normpath(whole)).is_relative_to(self.root) else "its path "
-            found = f"{str(path)[:120]} leads out of {self.root}" if link else f"{str(path)[:120]} is a link out of it"
-            raise InputError(f"column {column}", found, "put the file there, or pass --root DIR")
-        if not real.is_file():
-            found = "is a folder" if real.is_dir() else "no such file"
-            raise InputError(f"column {column}", f"{str(path)[:120]}: {found}", "check the path")
-        return real
+            if not real.is_relative_to(self.root):
+                straight = Path(os.path.normpath(whole)).is_relative_to(self.base)
+                found = f"{shown} is a link out of {self.root}" if straight else f"{shown} leads out of {self.root}"
+                raise InputError(f"column {column}", found, "put the file there, or pass --root DIR")
+            if not stat.S_ISREG(os.stat(real).st_mode):
+                raise InputError(f"column {column}", f"{shown} is no file", "check the path")
+        except OSError as error:  # also loops of links, and names that are too long
+            raise InputError(f"column {column}", f"{shown}: {error.strerror}", "check the path") from None
+        except ValueError as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"column {column}", f"{shown!r} is no path ({error})", "check the path") from None
+        return whole
 
     def shorten(self, text: str) -> str:
         """A message without the folder that all its paths have in common."""

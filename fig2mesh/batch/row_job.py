@@ -8,26 +8,23 @@ import shutil
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
-from functools import lru_cache
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
-from fig2mesh.batch.row_files import Roots, digest_of, input_files, inside, sheet_files
-from fig2mesh.batch.row_options import RowOptions, options_of
+from fig2mesh.batch.row_files import digest_of
+from fig2mesh.batch.row_request import RowRequest
 from fig2mesh.batch.rows import Value
+from fig2mesh.batch.stage_cache import StageCache
+from fig2mesh.batch.task import Batch, Outcome, Task
 from fig2mesh.errors import FigureError, InputError, OutputError
 
 if TYPE_CHECKING:
     from exporters.asset import Asset
     from exporters.placed_figure import Attributes
     from exporters.profiles import Profile
-    from fig2mesh.place import Placed, PlaceRequest
-    from georef.mapsheet import MapSheet
-
-FORMATS = ("gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
-"""What a row may ask for besides .glb."""
+    from fig2mesh.place import Placed
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -37,62 +34,10 @@ LASTING = ("claimed", "files")
 Advance = Callable[[str], object]
 
 
-@dataclass(frozen=True)
-class Batch:
-    """What all rows have in common.
-
-    roots : where their files are; folder : of the outputs; defaults : options where a row has none, column → value;
-    fresh : nothing that is kept is used; overwrite : folders of figures that no batch has begun may be replaced;
-    unplaced : rows need no place
-    """
-
-    roots: Roots
-    folder: Path
-    defaults: dict[str, Any]
-    fresh: bool = False
-    overwrite: bool = False
-    unplaced: bool = False
-
-
-@dataclass(frozen=True)
-class Task:
-    """A row with its name. number, where, values, problem : as in `Row`; name : of its folder; title : for people."""
-
-    number: int
-    where: str
-    name: str
-    title: str
-    values: dict[str, Value]
-    problem: str | None = None
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a row went.
-
-    status : done, or failed; error : one line, None if done; ours : the fault is ours, not the input's
-    lost : its worker could not record it; full : the disk is; unchanged : nothing was to do
-    seconds : of work; ran, reused : stages; counts : work done, by kind
-    """
-
-    number: int
-    name: str
-    status: str
-    error: str | None = None
-    ours: bool = False
-    lost: bool = False
-    full: bool = False
-    unchanged: bool = False
-    seconds: float = 0.0
-    ran: tuple[str, ...] = ()
-    reused: tuple[str, ...] = ()
-    counts: dict[str, int] = field(default_factory=dict)
-
-
 def check_row(batch: Batch, task: Task) -> Outcome:
     """Read everything that a row names, and say what is wrong; nothing is written, no network runs."""
     try:
-        request = _Request(batch, task)
+        request = RowRequest(batch, task)
         request.check()
     except InputError as error:
         return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
@@ -113,12 +58,13 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
     fault: BaseException | None = None
     try:
         try:
-            request = _Request(batch, task)
+            request = RowRequest(batch, task)
             record["key"] = request.key
             if not batch.fresh and before is not None and before.get("key") == request.key and request.stands(before):
                 return _outcome(task, before, unchanged=True)
             _claim(batch, task, ledger, record)
-            record |= request.convert(advance) | {"status": "done"}
+            cache = StageCache(batch.folder / WORK / "stages", batch.fresh)
+            record |= _convert(request, cache, advance) | {"status": "done"}
         except InputError as error:
             fault = error
             # What the disk refuses may go well next time; what is wrong with the input will not.
@@ -181,211 +127,100 @@ def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> 
             shutil.rmtree(stale, ignore_errors=True)
 
 
-class _Request:
-    """A row's request, read and checked as far as its words and its files go."""
+def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[str, Any]:
+    """Make the outputs; returns what the record says of them."""
+    from exporters.placed_figure import figure_of
+    from fig2mesh.batch.keys import key_of, stage_keys
+    from fig2mesh.batch.stage_cache import READ
+    from fig2mesh.convert import asset_of, settings_of, torch_device
+    from fig2mesh.counters import counting
+    from fig2mesh.parse.read import read_figure
+    from fig2mesh.parts.pieces import clean
+    from fig2mesh.pipeline import steps
+    from fig2mesh.place import place
+    from fig2mesh.plan import plan
+    from fig2mesh.report import model_measures
+    from fig2mesh.stages import figure_digest
 
-    def __init__(self, batch: Batch, task: Task) -> None:
-        from exporters.time_span import time_span
-        from fig2mesh.batch.keys import key_of
-
-        if task.problem is not None:
-            finding, _, remedy = task.problem.partition("; ")
-            raise InputError(task.where, finding, remedy or "correct the row")
-        self.batch, self.task = batch, task
-        self.options: RowOptions = options_of(task.values, batch.defaults, task.title)
-        for each in self.options.formats:
-            if each.lower().lstrip(".") not in FORMATS:
-                raise InputError("column format", each[:40], f"choose from {', '.join(FORMATS)}; .glb is always made")
-        trusted = frozenset(
-            parameter
-            for column, parameter in (("mask", "mask"), ("map", "map_sheet"), ("altitude_datum", "altitude_datum"))
-            if column not in task.values
-        )
-        if self.options.date is not None:
-            time_span(self.options.date, "column date")
-        self.values = inside(self.options.values, batch.roots, trusted)
-        self.place: PlaceRequest = self._place()
-        files = input_files(self.values)
-        self.inputs = {
-            self._seen(file): digest_of(file) for name in sorted(files) for file in files[name]
-        }  # fmt: skip
-        texts = {name: self._seen(v) if isinstance(v, Path) else str(v) for name, v in self.values.items()}
-        self.key = key_of(
-            options=texts, formats=self.options.formats, date=self.options.date, inputs=self.inputs,
-            attributes=self.options.attributes, title=task.title,
+    profile = request.profile()
+    settings = settings_of(device=torch_device(request.values["device"]), **request.settings())
+    sheet = request.sheet()
+    with counting() as counts:
+        advance("read")
+        own = ("figure", "mask", "keypoints", "part_labels")
+        files = {name: (path.name, digest_of(path)) for name in own if (path := request.values[name]) is not None}
+        key = key_of(stage=READ, files=files, bbox=request.values["bbox"])
+        drawn = cache.make(READ, key, lambda: read_figure(**request.files(), name=READ))
+        figure, pieces, specks = clean(
+            replace(drawn, name=request.task.title), settings.voxel, settings.picture_px
         )  # fmt: skip
-
-    def _seen(self, file: Path) -> str:
-        root = self.batch.roots.root
-        return (file.relative_to(root) if file.is_relative_to(root) else file).as_posix()
-
-    def _place(self) -> PlaceRequest:
-        from fig2mesh.place import PlaceRequest
-
-        fields = PlaceRequest.__dataclass_fields__
-        request = PlaceRequest(**{name: self.values[name] for name in fields})
-        if not (request.somewhere or self.batch.unplaced):
-            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or pass --unplaced")
-        return request
-
-    def _sheet(self) -> MapSheet | None:
-        from fig2mesh.place import open_map
-
-        if self.place.map_sheet is None:
-            return open_map(self.place)
-        digests = tuple(digest_of(file) for file in sheet_files(self.place.map_sheet))
-        return _open_map(replace(self.place, at=None), digests)
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """Outputs as seen from the folder of the figure."""
-        name = self.task.name
-        suffixes = dict.fromkeys(("glb", *(each.lower().lstrip(".") for each in self.options.formats)))
-        return tuple(f"{name}.{suffix}" for suffix in suffixes)
-
-    def stands(self, record: dict[str, Any]) -> bool:
-        """Whether a record of the same key says how this ends: its outputs are there, or its failure is lasting."""
-        if record["status"] == "failed":
-            return bool(record.get("lasting"))
-        if record["status"] != "done":
-            return False
-        try:
-            return all(digest_of(self.batch.folder / name) == digest for name, digest in record["outputs"].items())
-        except OSError:
-            return False
-
-    def profile(self) -> Profile:
-        """What the client of the outputs takes. Raises InputError where it does not read them."""
-        from exporters.profiles import profile_named
-        from exporters.write import needs_place
-
-        profile = profile_named(self.values["profile"])
-        profile.check_tools()
-        for target in self.targets:
-            profile.check(target, Path(target).suffix.lower())
-            if needs_place(target) and not self.place.somewhere:
-                raise InputError("column format", f"{target} needs a place on earth", "give lon and lat")
-        return profile
-
-    def check(self) -> None:
-        """Read the figure's files, as far as they are given, and its sheet. Raises InputError."""
-        from fig2mesh.convert import settings_of
-        from fig2mesh.parse.read import read_given
-
-        self.profile()
-        settings_of(device="cpu", **self._settings())
-        self._sheet()
-        read_given(**self._files())
-
-    def _files(self) -> dict[str, Any]:
-        names = {"figure": "path", "mask": "mask", "keypoints": "keypoints", "part_labels": "part_labels"}
-        return {argument: self.values[name] for name, argument in names.items()} | {"bbox": self.values["bbox"]}
-
-    def _settings(self) -> dict[str, Any]:
-        names = ("quality", "triangles", "texture_size", "lods", "parts", "textures", "contours", "effects", "mesher",
-                 "closing", "seed")  # fmt: skip
-        return {name: self.values[name] for name in names}
-
-    def convert(self, advance: Advance) -> dict[str, Any]:
-        """Make the outputs; returns what the record says of them."""
-        from exporters.placed_figure import figure_of
-        from fig2mesh.batch.keys import key_of, stage_keys
-        from fig2mesh.batch.stage_cache import READ, StageCache
-        from fig2mesh.convert import asset_of, settings_of, torch_device
-        from fig2mesh.counters import counting
-        from fig2mesh.parse.read import read_figure
-        from fig2mesh.parts.pieces import clean
-        from fig2mesh.pipeline import steps
-        from fig2mesh.place import place
-        from fig2mesh.plan import plan
-        from fig2mesh.report import model_measures
-        from fig2mesh.stages import figure_digest
-
-        profile = self.profile()
-        settings = settings_of(device=torch_device(self.values["device"]), **self._settings())
-        sheet = self._sheet()
-        cache = StageCache(None if self.batch.fresh else self.batch.folder / WORK / "stages")
-        with counting() as counts:
-            advance("read")
-            own = ("figure", "mask", "keypoints", "part_labels")
-            files = {name: digest_of(self.values[name]) for name in own if self.values[name] is not None}
-            key = key_of(stage=READ, files=files, bbox=self.values["bbox"])
-            drawn = cache.make(READ, key, lambda: read_figure(**self._files(), name=READ))
-            figure, pieces, specks = clean(
-                replace(drawn, name=self.task.title), settings.voxel, settings.picture_px
-            )  # fmt: skip
-            placed = place(self.place, sheet, figure, self.values["figure"])
-            normals = any(e.runs for e in plan(settings, self.targets).effects if e.name == "normals")
-            road = steps(settings, placed.height_m, normals=normals)
-            results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-            keys = stage_keys(figure_digest(figure), settings, normals)
-            cache.make_only(("model", "simplify"), road, results, keys, advance)
-            asset = asset_of(
-                self.task.title, results["model"], settings, placed, source=self.values["figure"].name,
-                quality=self.values["quality"], credit=self.values["credit"], evidence=self.values["evidence"],
-            )  # fmt: skip
-            advance("write")
-            outputs = self._write(asset, profile)
-            measures = model_measures(asset, results, placed.height_m)
-        record = {
-            "inputs": self.inputs,
-            "outputs": {name: digest for name, (_, digest) in outputs.items()},
-            "sizes": {name: size for name, (size, _) in outputs.items()},
-            "files": sorted(outputs),
-            "measures": measures,
-            "placement": None if asset.placement is None else asdict(asset.placement),
-            "map": placed.map,
-            "notes": self._notes(placed, specks, measures),
-            "date": self.options.date or _changed(self.values["figure"]),
-            "work": {"ran": cache.ran, "reused": cache.reused, "counts": {k: n for k, n in counts.items() if n}},
-        }
-        if asset.placement is not None:
-            contents = tuple(f"{self.task.name}/{name}" for name in self._levels(asset))
-            whole = replace(figure_of(asset, contents), attributes=_plain(self.options.attributes))
-            record["figure"] = asdict(whole)
-        return record
-
-    def _notes(self, placed: Placed, specks: int, measures: dict[str, Any]) -> list[str]:
-        notes = [self.batch.roots.shorten(note) for note in placed.notes]
-        if specks:
-            notes.append(f"{specks} specks of the silhouette are too small to model and were left out")
-        if measures["components"] != measures["pieces_drawn"]:
-            notes.append(f"{measures['components']} solids for {measures['pieces_drawn']} drawn pieces")
-        return notes
-
-    def _levels(self, asset: Asset) -> list[str]:
-        """Files of the levels of detail, finest first."""
-        name = self.task.name
-        return [f"{name}.glb", *(f"{name}_lod{level}.glb" for level in range(1, len(asset.lods)))]
-
-    def _write(self, asset: Asset, profile: Profile) -> dict[str, tuple[int, str]]:
-        """Write all outputs, or none; returns size and digest of each, by its path below the batch's folder."""
-        from exporters.write import in_order, write, write_whole
-
-        folder = self.batch.folder / self.task.name
-        main = folder / self.targets[0]
-
-        def fill(stage: Path) -> None:
-            for target in in_order(self.targets):
-                write(asset, stage / target, profile=profile)
-            for level, name in enumerate(self._levels(asset)[1:], start=1):
-                write(replace(asset, lods=(asset.lods[level],)), stage / name, profile=profile)
-
-        before = (Ledger(self.batch.folder).read(self.task.name) or {}).get("files", [])
-        outdated = [Path(name).name for name in before]
-        files = write_whole(main, main, fill, overwrite=True, outdated=outdated)
-        return {
-            file.relative_to(self.batch.folder).as_posix(): (file.stat().st_size, digest_of(file))
-            for file in sorted(files)
-        }
+        placed = place(request.place, sheet, figure, request.values["figure"])
+        normals = any(e.runs for e in plan(settings, request.targets).effects if e.name == "normals")
+        road = steps(settings, placed.height_m, normals=normals)
+        results: dict[str, Any] = {"figure": figure, "pieces": pieces}
+        keys = stage_keys(figure_digest(figure), settings, normals)
+        cache.make_only(("model", "simplify"), road, results, keys, advance)
+        asset = asset_of(
+            request.task.title, results["model"], settings, placed, source=request.values["figure"].name,
+            quality=request.values["quality"], credit=request.values["credit"], evidence=request.values["evidence"],
+        )  # fmt: skip
+        advance("write")
+        outputs = _write(request, asset, profile)
+        measures = model_measures(asset, results, placed.height_m)
+    record = {
+        "inputs": request.inputs,
+        "outputs": {name: digest for name, (_, digest) in outputs.items()},
+        "sizes": {name: size for name, (size, _) in outputs.items()},
+        "files": sorted(outputs),
+        "measures": measures,
+        "placement": None if asset.placement is None else asdict(asset.placement),
+        "map": placed.map,
+        "notes": _notes(request, placed, specks, measures),
+        "date": request.options.date or _changed(request.values["figure"]),
+        "work": {"ran": cache.ran, "reused": cache.reused, "counts": {k: n for k, n in counts.items() if n}},
+    }
+    if asset.placement is not None:
+        contents = tuple(f"{request.task.name}/{name}" for name in _levels(request, asset))
+        whole = replace(figure_of(asset, contents), attributes=_plain(request.options.attributes))
+        record["figure"] = asdict(whole)
+    return record
 
 
-@lru_cache(maxsize=8)
-def _open_map(request: PlaceRequest, digests: tuple[str, ...]) -> MapSheet | None:
-    """The sheet of a request; the same one is read once."""
-    from fig2mesh.place import open_map
+def _notes(request: RowRequest, placed: Placed, specks: int, measures: dict[str, Any]) -> list[str]:
+    notes = [request.batch.roots.shorten(note) for note in placed.notes]
+    if specks:
+        notes.append(f"{specks} specks of the silhouette are too small to model and were left out")
+    if measures["components"] != measures["pieces_drawn"]:
+        notes.append(f"{measures['components']} solids for {measures['pieces_drawn']} drawn pieces")
+    return notes
 
-    return open_map(request)
+
+def _levels(request: RowRequest, asset: Asset) -> list[str]:
+    """Files of the levels of detail, finest first."""
+    name = request.task.name
+    return [f"{name}.glb", *(f"{name}_lod{level}.glb" for level in range(1, len(asset.lods)))]
+
+
+def _write(request: RowRequest, asset: Asset, profile: Profile) -> dict[str, tuple[int, str]]:
+    """Write all outputs, or none; returns size and digest of each, by its path below the batch's folder."""
+    from exporters.write import in_order, write, write_whole
+
+    folder = request.batch.folder / request.task.name
+    main = folder / request.targets[0]
+
+    def fill(stage: Path) -> None:
+        for target in in_order(request.targets):
+            write(asset, stage / target, profile=profile)
+        for level, name in enumerate(_levels(request, asset)[1:], start=1):
+            write(replace(asset, lods=(asset.lods[level],)), stage / name, profile=profile)
+
+    before = (Ledger(request.batch.folder).read(request.task.name) or {}).get("files", [])
+    outdated = [Path(name).name for name in before]
+    files = write_whole(main, main, fill, overwrite=True, outdated=outdated)
+    return {
+        file.relative_to(request.batch.folder).as_posix(): (file.stat().st_size, digest_of(file))
+        for file in sorted(files)
+    }
 
 
 def _plain(attributes: Mapping[str, Value]) -> Attributes:

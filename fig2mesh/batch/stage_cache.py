@@ -30,9 +30,13 @@ READ: Final = "figure"
 
 @dataclass
 class StageCache:
-    """Results in files below `folder`; None keeps nothing."""
+    """Results in files below `folder`.
 
-    folder: Path | None
+    fresh : nothing is read, all is kept; ran, reused : stages that ran, and that were read
+    """
+
+    folder: Path
+    fresh: bool = False
     ran: list[str] = field(default_factory=list)
     reused: list[str] = field(default_factory=list)
 
@@ -75,13 +79,12 @@ class StageCache:
             need(goal)
 
     def _path(self, key: str) -> Path:
-        assert self.folder is not None
         return self.folder / key[:2] / f"{key}.npz"
 
     def _load(self, stage: str, key: str) -> Any:
         from fig2mesh.stages import read_result
 
-        if self.folder is None or not self._path(key).is_file():
+        if self.fresh or not self._path(key).is_file():
             return None
         try:
             found = read_result(self._path(key), stage)
@@ -96,8 +99,6 @@ class StageCache:
     def _save(self, stage: str, key: str, value: Any) -> None:
         from fig2mesh.stages import write_result
 
-        if self.folder is None:
-            return
         try:
             self._path(key).parent.mkdir(parents=True, exist_ok=True)
             write_result(self._path(key), stage, value)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fig2mesh.batch.ledger import WORK, Ledger
-from fig2mesh.batch.row_job import Task
+from fig2mesh.batch.task import Task
 from fig2mesh.batch.tasks import read_spool
 
 MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"

@@ -11,8 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Final
 
 from exporters.tiles import safe_name
-from fig2mesh.batch.row_job import Task
 from fig2mesh.batch.row_options import is_known
+from fig2mesh.batch.task import Task
 
 if TYPE_CHECKING:
     from fig2mesh.batch.rows import Row

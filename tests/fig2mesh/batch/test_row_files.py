@@ -1,0 +1,77 @@
+"""Files that rows name stay inside of the collection's folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fig2mesh.batch.row_files import Roots, digest_of, sheet_files
+from fig2mesh.errors import InputError
+
+
+@pytest.fixture
+def roots(tmp_path: Path) -> Roots:
+    """tmp_path/all/collection is the collection's folder; outside of it are secret.png and other/."""
+    (tmp_path / "all" / "collection" / "pictures").mkdir(parents=True)
+    (tmp_path / "all" / "collection" / "pictures" / "a.png").write_bytes(b"a")
+    (tmp_path / "all" / "secret.png").write_bytes(b"s")
+    base = tmp_path / "all" / "collection"
+    return Roots(base, base.resolve())
+
+
+def test_files_inside_are_found_by_any_way_to_write_them(roots: Roots) -> None:
+    inside = roots.base / "pictures" / "a.png"
+    for text in ("pictures/a.png", "./pictures/../pictures/a.png", str(inside)):
+        assert roots.resolve("figure", Path(text)).samefile(inside)
+
+
+@pytest.mark.parametrize("text", ["../secret.png", "pictures/../../secret.png", "/etc/passwd", "../nothing.png"])
+def test_paths_that_lead_out_are_refused(roots: Roots, text: str) -> None:
+    with pytest.raises(InputError, match="leads out of") as caught:
+        roots.resolve("figure", Path(text))
+    assert "--root" in str(caught.value)
+
+
+def test_links_that_lead_out_are_refused_whether_of_files_or_folders(roots: Roots) -> None:
+    (roots.base / "link.png").symlink_to(roots.base.parent / "secret.png")
+    (roots.base / "up").symlink_to(roots.base.parent)
+    for text in ("link.png", "up/secret.png"):
+        with pytest.raises(InputError, match="is a link out of"):
+            roots.resolve("figure", Path(text))
+
+
+def test_links_inside_and_a_wider_root_are_taken(roots: Roots) -> None:
+    (roots.base / "same.png").symlink_to("pictures/a.png")
+    assert roots.resolve("figure", Path("same.png")).read_bytes() == b"a"
+    wide = Roots(roots.base, roots.root.parent)
+    assert wide.resolve("figure", Path("../secret.png")).read_bytes() == b"s"
+
+
+def test_names_that_no_file_can_have_are_refused(roots: Roots) -> None:
+    (roots.base / "loop").symlink_to("loop")
+    for text in ("a\0b.png", "loop", "x" * 5000, "pictures", "missing.png", ""):
+        with pytest.raises(InputError) as caught:
+            roots.resolve("figure", Path(text))
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 600
+
+
+def test_messages_are_without_the_folder(roots: Roots) -> None:
+    assert roots.shorten(f"{roots.base}/pictures/a.png: bad") == "pictures/a.png: bad"
+
+
+def test_what_belongs_to_a_sheet(tmp_path: Path) -> None:
+    for name in ("map.tif", "map.tfw", "map.prj", "map.tif.points", "map2.tif", "MAP.PRJ"):
+        (tmp_path / name).touch()
+    found = {path.name for path in sheet_files(tmp_path / "map.tif")}
+    assert found == {"map.tif", "map.tfw", "map.prj", "map.tif.points", "MAP.PRJ"}
+
+
+def test_digests_follow_the_content(tmp_path: Path) -> None:
+    file = tmp_path / "a"
+    file.write_bytes(b"one")
+    first = digest_of(file)
+    assert digest_of(file) == first
+    file.write_bytes(b"other")
+    assert digest_of(file) != first

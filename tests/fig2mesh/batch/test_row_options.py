@@ -1,0 +1,108 @@
+"""Rows as options of the main job."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fig2mesh.batch.row_options import OURS, defaults_of, is_known, known_columns, options_of
+from fig2mesh.cli import make
+from fig2mesh.errors import InputError
+
+
+def test_every_option_of_the_main_job_is_a_column_or_ours() -> None:
+    names = {max(p.opts, key=len).lstrip("-") for p in make.params if isinstance(p, click.Option)}
+    assert {name.replace("-", "_") for name in names - set(OURS)} == set(known_columns())
+    assert set(OURS) <= names
+    assert all(is_known(column) for column in (*known_columns(), "figure", "lon", "lat", "x", "y", "date", "format"))
+    assert not is_known("artist")
+
+
+@given(st.floats(-180, 180), st.floats(-90, 90), st.integers(200, 2_000_000), st.floats(0.5, 100))
+def test_values_arrive_as_on_the_command_line(lon: float, lat: float, triangles: int, height: float) -> None:
+    row = {"figure": "a.png", "lon": lon, "lat": lat, "triangles": triangles, "height_m": height}
+    words = ["a.png", "--lonlat", repr(lon), repr(lat), "--triangles", str(triangles), "--height-m", repr(height)]
+    assert options_of(row, {}, "n").values == make.make_context("row", [*words, "--name", "n"]).params
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "parameter", "expected"),
+    [
+        ("bbox", "1 2 30 40", "bbox", (1, 2, 30, 40)),
+        ("bbox", (1, 2, 30.0, 40), "bbox", (1, 2, 30, 40)),
+        ("lonlat", "8.5, 47.4", "lonlat", (8.5, 47.4)),
+        ("effect", "light;light", "effects", ("light", "light")),
+        ("effect", ("light",), "effects", ("light",)),
+        ("evidence", "no", "evidence", False),
+        ("evidence", True, "evidence", True),
+        ("evidence", 0.0, "evidence", False),
+        ("seed", 7.0, "seed", 7),
+        ("height_m", "2.5", "height_m", 2.5),
+        ("mask", "m.png", "mask", Path("m.png")),
+        ("map", "sheet.tif", "map_sheet", Path("sheet.tif")),
+        ("credit", "-not an option", "credit", "-not an option"),
+        ("facing", "NE", "facing", "NE"),
+    ],
+)
+def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: Any) -> None:
+    assert options_of({"figure": "a.png", column: value}, {}, "n").values[parameter] == expected
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ({}, "column figure: is empty; name the picture of the figure"),
+        ({"figure": "a", "lon": 8.0}, "column lat: is empty; give both lon and lat"),
+        ({"figure": "a", "y": 8.0}, "column x: is empty; give both x and y"),
+        ({"figure": "a", "lon": 1, "lat": 2, "lonlat": "1 2"}, "column lonlat: beside lon and lat; give it once"),
+        ({"figure": "a", "lonlat": "1"}, "column lonlat: 1 values; give 2: LON LAT"),
+        ({"figure": "a", "quality": "superb"}, "column quality: 'superb' is not one of"),
+        ({"figure": "a", "triangles": "many"}, "column triangles: 'many' is not a valid integer"),
+        ({"figure": "a", "seed": -1}, "column seed: -1 is not in the range"),
+        ({"figure": "a", "evidence": "maybe"}, "column evidence: 'maybe'; give true or false"),
+        ({"figure": "a", "output": "b.glb"}, "column output: is chosen by the batch; remove the column"),
+        ({"figure": "a", "overwrite": True}, "column overwrite: is chosen by the batch"),
+        ({"figure": "a", "save_stages": "x"}, "column save_stages: is chosen by the batch"),
+    ],
+)
+def test_what_is_wrong_is_said_of_the_column(row: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        options_of(row, {}, "n")
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_row_goes_before_the_defaults() -> None:
+    defaults = {"quality": "fine", "map": "/sheet.tif", "effect": ("none",), "seed": 3}
+    bare = options_of({"figure": "a", "x": 1, "y": 2}, defaults, "n").values
+    assert (bare["quality"], bare["map_sheet"], bare["effects"], bare["at"]) == (
+        "fine", Path("/sheet.tif"), ("none",), (1.0, 2.0),
+    )  # fmt: skip
+    own = options_of({"figure": "a", "lon": 1, "lat": 2, "quality": "draft", "effect": "light"}, defaults, "n").values
+    assert (own["quality"], own["map_sheet"], own["effects"], own["seed"]) == ("draft", None, ("light",), 3)
+    other = options_of({"figure": "a", "map": "other.tif"}, {"lonlat": (1.0, 2.0)}, "n").values
+    assert (other["lonlat"], other["map_sheet"]) == (None, Path("other.tif"))
+
+
+def test_what_is_no_option_is_an_attribute() -> None:
+    found = options_of({"figure": "a", "artist": "Anna", "year": 1893, "date": 1893, "format": "usdz ply"}, {}, "n")
+    assert found.attributes == {"artist": "Anna", "year": 1893}
+    assert (found.date, found.formats) == ("1893", ("usdz", "ply"))
+
+
+def test_options_of_one_figure_are_no_defaults() -> None:
+    names = {option.name for option in defaults_of(make)}
+    assert {"quality", "map_sheet", "facing", "height_m", "credit"} <= names
+    assert not names & {"name", "bbox", "mask", "keypoints", "lonlat", "at", "outputs", "overwrite"}
+
+
+@given(st.dictionaries(st.sampled_from(known_columns()), st.text() | st.floats() | st.integers() | st.booleans()))
+def test_any_values_are_taken_or_refused(values: dict[str, Any]) -> None:
+    with suppress(InputError):
+        assert options_of({"figure": "a.png", **values}, {}, "n").values["figure"] == Path("a.png")
