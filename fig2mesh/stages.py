@@ -95,7 +95,7 @@ def read_result(path: Path, stage: str) -> Any:
             if str(archive["__stage__"]) != stage:
                 raise ValueError(f"it holds {archive['__stage__']}")
             return _unpack(json.loads(str(archive["__tree__"])), archive, _classes())
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         found = f"not a stage file of this version ({' '.join(str(error).split())[:80]})"
         raise FigureError(path, found, "run again with --save-stages and without --resume-from") from None
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from fig2mesh.place import PlaceRequest
     from georef.mapsheet import MapSheet
 
-FORMATS = ("gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
-"""What a row may ask for besides .glb."""
+FORMATS = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
+"""What a row may ask for; .glb is always made."""
 
 
 class RowRequest:

@@ -24,7 +24,7 @@ FIGURE = Path(__file__).parents[2] / "examples" / "figures" / "farmer"
 def measure() -> dict[str, dict[str, Any]]:
     """All benchmarks of this version."""
     with tempfile.TemporaryDirectory() as folder:
-        return {**whole_figures(Path(folder)), **tracing(), **levels(Path(folder)), **decoding()}
+        return {**whole_figures(Path(folder)), **tracing(), **levels(Path(folder)), **decoding(), **batch(Path(folder))}
 
 
 def arguments(target: Path, *more: str) -> list[str]:
@@ -110,6 +110,15 @@ def decoding() -> dict[str, dict[str, Any]]:
         "decode_s": _value(fast, "s", f"14 parts at 64³, {share:.0f} % of the nodes asked for; median of 3"),
         "decode_dense_s": _value(dense, "s", "14 parts at 64³, every node; median of 3"),
     }
+
+
+def batch(folder: Path) -> dict[str, dict[str, Any]]:
+    """Two workers over one, a figure of draft quality a row."""
+    from tests.benchmarks.batch import speedup
+
+    found = speedup(folder, 12, "draft")["speedup_2"]
+    how = "figures a minute with two workers over one, draft quality, 12 rows, after each worker's first"
+    return {"batch_speedup_2": _value(found, "1", how)}
 
 
 def _seconds(job: Callable[[], Any]) -> float:
