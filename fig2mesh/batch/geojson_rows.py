@@ -60,27 +60,14 @@ def geojson_rows(path: Path) -> Iterator[Row]:
 
 
 def _by_lines(path: Path, stream: BinaryIO, head: bytes) -> bool:
-    """Whether each line is a feature of its own: the first one is, or the suffix says so."""
-    line = b""
-    while line.isspace() or not line:
-        line = stream.readline(MAX_LINE)
-        if not line:
-            break
-    kind = None
-    try:
-        events = Source(BytesIO(line)).events()
-        if next(events, None) == ("start_map", None):
-            feature = Feature()
-            for event, key in events:
-                if event == "map_key":
-                    feature.member(key, events)
-                    if feature.kind not in (None, "Feature"):
-                        break
-            else:
-                kind = feature.kind
-    except (NotJson, StopIteration):
-        pass
-    return kind == "Feature" or (path.suffix.lower() in SEQUENCES and b'"FeatureCollection"' not in head)
+    """Whether each line is a feature of its own: the first two are no parts of one document, or its suffix says so."""
+    lines: list[bytes] = []
+    while len(lines) < 2 and (line := stream.readline(MAX_LINE)):
+        if line := line.strip():
+            lines.append(line)
+    if len(lines) == 2 and lines[0][:1] == b"{" and lines[0][-1:] == b"}" and lines[1][:1] not in (b",", b"]", b"}"):
+        return True
+    return path.suffix.lower() in SEQUENCES and b'"FeatureCollection"' not in head
 
 
 def _lines(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
