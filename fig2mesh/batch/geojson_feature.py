@@ -5,7 +5,7 @@ What is not needed is skipped without being kept: geometries other than points, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
@@ -59,35 +59,47 @@ class NotJson(Exception):
     """The parser's finding, in one line."""
 
 
-class Source:
-    """A file for ijson that stops where a single value would fill the memory."""
+def events_of(stream: BinaryIO) -> Events:
+    """Events of ijson, where no value can fill the memory; raises NotJson after those before the fault."""
+    found = ijson.sendable_list()
+    parser = ijson.basic_parse_coro(found)
+    quiet, digits = 0, b""
+    try:
+        while data := stream.read(CHUNK):
+            quiet += len(data)
+            if quiet > MAX_QUIET + CHUNK:
+                raise NotJson(f"more than {MAX_QUIET:,} bytes without a new value")
+            digits += data.translate(_DIGITS)
+            if _TOO_MANY in digits:
+                raise NotJson(f"a number of more than {MAX_DIGITS} digits")
+            digits = digits[-MAX_DIGITS:]
+            fault = _fault(lambda data=data: parser.send(data))  # type: ignore[misc]
+            if found:
+                quiet = 0
+                yield from found
+                found.clear()
+            if fault:
+                raise NotJson(fault)
+        fault = _fault(parser.close)
+        yield from found
+        if fault:
+            raise NotJson(fault)
+    finally:
+        # A parser that is left in the middle of a document complains, on stderr if it is not asked.
+        _fault(parser.close)
 
-    def __init__(self, stream: BinaryIO) -> None:
-        self._stream = stream
-        self._quiet = 0
-        self._digits = b""
 
-    def read(self, size: int = -1) -> bytes:
-        data = self._stream.read(size)
-        self._quiet += len(data)
-        if self._quiet > MAX_QUIET + CHUNK:
-            raise NotJson(f"more than {MAX_QUIET:,} bytes without a new value")
-        digits = self._digits + data.translate(_DIGITS)
-        if _TOO_MANY in digits:
-            raise NotJson(f"a number of more than {MAX_DIGITS} digits")
-        self._digits = digits[-MAX_DIGITS:]
-        return data
-
-    def events(self) -> Events:
-        """Events of `ijson.basic_parse`; raises NotJson."""
-        try:
-            for event in ijson.basic_parse(self, buf_size=CHUNK):
-                self._quiet = 0
-                yield event
-        except BROKEN as error:
-            found = error.args[0] if error.args else type(error).__name__
-            text = found.decode("utf-8", "replace") if isinstance(found, bytes) else str(found)
-            raise NotJson(shown(text.partition("\n")[0].strip(), 100)) from None
+def _fault(act: Callable[[], object]) -> str | None:
+    """What a parser finds wrong, in one line."""
+    try:
+        act()
+    except BROKEN as error:
+        found = error.args[0] if error.args else type(error).__name__
+        text = found.decode("utf-8", "replace") if isinstance(found, bytes) else str(found)
+        return shown(text.partition("\n")[0].strip(), 100) or type(error).__name__
+    except StopIteration:
+        pass
+    return None
 
 
 @dataclass(slots=True)

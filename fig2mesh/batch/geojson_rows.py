@@ -13,7 +13,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
-from fig2mesh.batch.geojson_feature import CHUNK, CLOSE, OPEN, Events, Feature, NotJson, Source, read_feature, skip
+from fig2mesh.batch.geojson_feature import CHUNK, CLOSE, OPEN, Events, Feature, NotJson, events_of, read_feature, skip
 from fig2mesh.batch.rows import MAX_NESTING, Row, Unfit, make_row, shown
 from fig2mesh.errors import InputError
 
@@ -108,7 +108,7 @@ def _sequence(records: Iterator[tuple[str, bytes | None]]) -> Iterator[Row]:
             yield make_row(number, where, (), Unfit(f"more than {MAX_LINE:,} bytes", "simplify its geometry"))
             continue
         try:
-            events = Source(BytesIO(record)).events()
+            events = events_of(BytesIO(record))
             feature = read_feature(events, next(events))
             for _ in events:
                 pass
@@ -120,7 +120,7 @@ def _sequence(records: Iterator[tuple[str, bytes | None]]) -> Iterator[Row]:
 
 def _document(path: Path, stream: BinaryIO, start: int) -> Iterator[Row]:
     """The features of a FeatureCollection, or the one that is the whole document."""
-    events = Source(stream).events()
+    events = events_of(stream)
     top = Feature()
     number = 0
     try:
@@ -192,7 +192,7 @@ def _later_crs(path: Path, start: int) -> str | None:
         else:
             return None
         stream.seek(start)
-        events = Source(stream).events()
+        events = events_of(stream)
         next(events)
         for event, key in events:
             if event == "map_key" and key == "crs":
