@@ -60,15 +60,16 @@ def columns(path: Path, layer: str | None = None) -> tuple[str, ...] | None:
 
 def _kind(path: Path, layer: str | None) -> str:
     """csv, geojson or gpkg."""
-    if not path.exists():
-        raise InputError(path, "no such file", "give a collection as CSV, GeoJSON or GeoPackage")
-    if not path.is_file():
-        raise InputError(path, "not a file", "give a collection as CSV, GeoJSON or GeoPackage")
     try:
+        if not path.exists():
+            raise InputError(path, "no such file", "give a collection as CSV, GeoJSON or GeoPackage")
+        # Not a pipe either: some kinds are read twice.
+        if not path.is_file():
+            raise InputError(path, "not a file", "give a collection as CSV, GeoJSON or GeoPackage")
         with path.open("rb") as stream:
             head = stream.read(64)
     except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", "check its permissions") from None
+        raise InputError(path, f"cannot be read ({error.strerror})", "check its name and permissions") from None
     suffix = path.suffix.lower()
     start = head.removeprefix(b"\xef\xbb\xbf").lstrip()
     if head.startswith(SQLITE_MAGIC):

@@ -129,6 +129,12 @@ def _opened(path: Path) -> Iterator[sqlite3.Connection]:
             connection.execute("PRAGMA trusted_schema = OFF")
             connection.execute("PRAGMA cell_size_check = ON")
             yield connection
+    except UnicodeError:
+        # Of a message of SQLite on names that are no UTF-8.
+        raise InputError(path, "cannot be read (names that are no UTF-8)", NOT_ONE) from None
+    except MemoryError:
+        # SQLite's own, of sizes in a damaged file.
+        raise InputError(path, "cannot be read (it asks for more memory than there is)", NOT_ONE) from None
     except sqlite3.Error as error:
         if "interrupted" in str(error):
             raise InputError(path, "a view takes too long", "save the layer as a table") from None

@@ -143,10 +143,10 @@ def fit_text(text: str) -> str | Unfit | None:
 
 def fit(value: object) -> Value | Unfit | None:
     """A value as a row may have it: finite, not too long, without objects in it."""
-    if value is None or isinstance(value, bool | Unfit):
-        return value
     if isinstance(value, str):
         return fit_text(value)
+    if value is None or isinstance(value, bool) or isinstance(value, Unfit):  # noqa: SIM101 (twice as fast)
+        return value
     if isinstance(value, int):
         return value if abs(value) <= MAX_INTEGER else Unfit("an integer of more than 64 bits", "write it as text")
     if isinstance(value, float | Decimal):

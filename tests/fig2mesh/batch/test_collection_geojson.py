@@ -29,7 +29,7 @@ def parser(request, monkeypatch):
         backend = ijson.get_backend(request.param)
     except ImportError:
         pytest.skip("ijson is without its parser in C here")
-    monkeypatch.setattr(geojson_rows.ijson, "basic_parse", backend.basic_parse)
+    monkeypatch.setattr(ijson, "basic_parse_coro", backend.basic_parse_coro)
     return request.param
 
 
