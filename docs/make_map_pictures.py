@@ -79,8 +79,8 @@ def map_in_blender(models: list[Path], folder: Path, picture: Path, samples: int
 def main() -> None:
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/map")
     names = [name for name, _, _ in draw_map.PEOPLE]
-    models = [folder / f"{name}{suffix}" for name in names for suffix in (".glb", ".usdc")]
-    tiles = folder / "tiles" / "tileset.json"
+    models = [folder / name / f"{name}{suffix}" for name in names for suffix in (".glb", ".usdc")]
+    tiles = folder / "tileset.json"
     if not all(file.is_file() for file in (*models, tiles)):
         run(folder)
     globe(tiles, ROOT / "docs" / "globe.jpg")

@@ -205,8 +205,9 @@ def people() -> list[dict[str, str | float]]:
         box = [x + (left - feet) * scale, y - TALL, x + (right - feet) * scale, y]
         metres = TALL * METRES_PER_DEGREE[1] * (NORTH - SOUTH) / HEIGHT
         rows.append({
-            "name": name.replace("_", " "), "figure": f"../../figures/{name}/image.png", "map": "map.jpg",
-            "x": x, "y": y, "height-m": round(metres, 1), "bbox": " ".join(str(round(v)) for v in box),
+            "name": name.replace("_", " "), "figure": f"../../figures/{name}/image.png",
+            "keypoints": f"../../figures/{name}/keypoints.json", "map": "map.jpg", "x": x, "y": y,
+            "height-m": round(metres, 1), "box_on_map": " ".join(str(round(v)) for v in box),
         })  # fmt: skip
     return rows
 
@@ -226,7 +227,7 @@ def drawn_person(row: dict[str, str | float]) -> str:
     cut = image.crop(mask.getbbox())
     stream = io.BytesIO()
     cut.save(stream, "PNG")
-    x0, y0, x1, y1 = map(float, str(row["bbox"]).split())
+    x0, y0, x1, y1 = map(float, str(row["box_on_map"]).split())
     data = base64.b64encode(stream.getvalue()).decode()
     shade = ellipse(float(row["x"]), float(row["y"]) - 4, 0.36 * (x1 - x0), 13, INK, 'opacity="0.3"')
     place = f'x="{x0}" y="{y0}" width="{x1 - x0}" height="{y1 - y0}" preserveAspectRatio="none"'
@@ -236,7 +237,7 @@ def drawn_person(row: dict[str, str | float]) -> str:
 def svg(rows: Sequence[dict[str, str | float]]) -> str:
     """The sheet; the same one each time."""
     draw = random.Random(7)
-    boxes = [tuple(map(float, str(row["bbox"]).split())) for row in rows]
+    boxes = [tuple(map(float, str(row["box_on_map"]).split())) for row in rows]
     parts = [f'<rect width="{WIDTH}" height="{HEIGHT}" fill="{LAND}"/>', *waters()]
     for road in SHEET["roads"]:
         parts += [line(path(road), INK, 5.4, 'opacity="0.8"'), line(path(road), ROAD, 3.2)]

@@ -2,47 +2,35 @@
 
 python examples/place_three_from_map.py [OUT]
 
-The map's world file says where its pixels are; figures.csv says where on it the feet are. One tileset holds all three.
-To see them stand on it: fig2mesh globe OUT/tiles --overlay examples/maps/lake_zurich/map.jpg 8.38 47.16 8.92 47.44
+A collection of three rows: figures.csv says where on the map the feet are, the map's world file where its pixels are on
+the earth. A collection of thousands is converted by the same command. To see the three stand on their map:
+fig2mesh globe OUT/tileset.json --overlay examples/maps/lake_zurich/map.jpg 8.38 47.16 8.92 47.44
 """
 
 from __future__ import annotations
 
-import csv
+import json
 import sys
 from pathlib import Path
 
 from fig2mesh.cli import main
 
-MAP = Path(__file__).resolve().parent / "maps" / "lake_zurich"
+EXAMPLES = Path(__file__).resolve().parent
+MAP = EXAMPLES / "maps" / "lake_zurich"
 
 
-def run(out_dir: Path, quality: str = "standard", suffixes: tuple[str, ...] = (".glb", ".usdc")) -> list[Path]:
-    """Convert the figures on the map; return the files made, one a figure and suffix, and the tileset of all."""
+def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("usdc",)) -> list[Path]:
+    """Convert the figures on the map; return the files made, one a figure and format, and the tileset of all."""
     out_dir = Path(out_dir)
-    out_dir.mkdir(parents=True, exist_ok=True)
-    outputs = []
-    with (MAP / "figures.csv").open(encoding="utf-8", newline="") as stream:
-        for row in csv.DictReader(stream):
-            image = MAP / row["figure"]
-            made = [out_dir / f"{row['name'].replace(' ', '_')}{suffix}" for suffix in suffixes]
-            _fig2mesh(
-                image, "--keypoints", image.with_name("keypoints.json"), "--name", row["name"],
-                "--map", MAP / row["map"], "--at", row["x"], row["y"], "--height-m", row["height-m"],
-                "--quality", quality, "--credit", "fig2mesh authors, MIT", "--overwrite",
-                *(word for path in made for word in ("-o", path)),
-            )  # fmt: skip
-            outputs += made
-    tiles = out_dir / "tiles"
-    models = [path for path in outputs if path.suffix == ".glb"]
-    _fig2mesh("tileset", *models, "-o", tiles, "--visible-from", 500_000, "--overwrite")
-    return [*outputs, tiles / "tileset.json"]
-
-
-def _fig2mesh(*words: object) -> None:
-    code = main([str(word) for word in words])
-    if code:
+    words = [
+        "batch", MAP / "figures.csv", "-o", out_dir, "--root", EXAMPLES, "--quality", quality,
+        "--credit", "fig2mesh authors, MIT", "--visible-from", 500_000, "--title", "Around Lake Zürich",
+        *(word for suffix in formats for word in ("--format", suffix)),
+    ]  # fmt: skip
+    if code := main([str(word) for word in words]):
         raise SystemExit(code)
+    rows = map(json.loads, (out_dir / "manifest.jsonl").read_text(encoding="utf-8").splitlines())
+    return [*(out_dir / name for row in rows for name in row["outputs"]), out_dir / "tileset.json"]
 
 
 if __name__ == "__main__":

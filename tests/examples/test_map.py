@@ -47,7 +47,7 @@ def test_the_world_file_gives_the_edges_and_the_feet() -> None:
 def test_people_are_drawn_in_their_boxes() -> None:
     sheet = np.asarray(Image.open(MAP / "map.jpg")).astype(int)
     for row in FIGURES:
-        left, top, right, bottom = map(int, row["bbox"].split())
+        left, top, right, bottom = map(int, row["box_on_map"].split())
         assert bottom == round(float(row["y"]))
         assert left < float(row["x"]) < right
         figure = np.asarray(Image.open(MAP / row["figure"]).convert("RGBA"))
@@ -62,7 +62,7 @@ def test_people_are_drawn_in_their_boxes() -> None:
 
 @pytest.mark.slow
 def test_people_come_to_stand_where_the_map_shows_them(tmp_path: Path) -> None:
-    made = run(tmp_path, quality="draft", suffixes=(".glb",))
+    made = run(tmp_path, quality="draft", formats=())
     *models, tileset = made
     assert [path.name for path in models] == ["footballer.glb", "market_woman.glb", "farmer.glb"]
     for path, row, (_, lon, lat) in zip(models, FIGURES, draw_map.PEOPLE, strict=True):
