@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tests.installing import alone_in
+from tests.installing import alone_in, install
 from tests.node import CLIENTS, ROOT
 
 ENVIRONMENT = ROOT / "build" / "blender"
@@ -30,14 +30,10 @@ def blender_python() -> Path:
             base = sys.executable if sys.version_info[:2] == PYTHON else shutil.which(name)
             if base is None:
                 pytest.skip(f"bpy needs {name}, which is not there: not looked at in Blender")
-            commands = [
-                [base, "-m", "venv", "--clear", str(ENVIRONMENT)],
-                [str(interpreter), "-m", "pip", "install", "-q", *PACKAGES],
-            ]
-            for command in commands:
-                install = subprocess.run(command, capture_output=True, text=True, check=False, timeout=900)
-                if install.returncode:
-                    pytest.skip(f"bpy cannot be installed: {install.stderr.strip()[-200:]}")
+            make = [base, "-m", "venv", "--clear", "--without-pip", str(ENVIRONMENT)]
+            made = subprocess.run(make, capture_output=True, text=True, check=False)
+            if problem := made.stderr.strip()[-200:] if made.returncode else install(interpreter, *PACKAGES):
+                pytest.skip(f"bpy cannot be installed: {problem}")
             done.write_text(json.dumps(PACKAGES))
     return interpreter
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tests.installing import alone_in
+from tests.installing import alone_in, install
 from tests.node import CLIENTS, ROOT
 
 VERSION = "12.1.1"
@@ -26,11 +26,9 @@ def read(script: str, tileset: Path) -> Any:
     """
     with alone_in(FOLDER):
         if not (FOLDER / f"py3dtiles-{VERSION}.dist-info").is_dir():
-            target = ["--no-deps", "--upgrade", "--target", str(FOLDER), f"py3dtiles=={VERSION}"]
-            command = [sys.executable, "-m", "pip", "install", "-q", "--disable-pip-version-check", *target]
-            install = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-            if install.returncode:
-                pytest.skip(f"py3dtiles cannot be installed: {install.stderr.strip()[-200:]}")
+            target = ["--no-deps", "--upgrade", "--target", str(FOLDER)]
+            if problem := install(sys.executable, *target, f"py3dtiles=={VERSION}"):
+                pytest.skip(f"py3dtiles cannot be installed: {problem}")
     done = subprocess.run(
         [sys.executable, str(CLIENTS / script), str(tileset)], capture_output=True, text=True, check=False,
         timeout=120, env=os.environ | {"PYTHONPATH": str(FOLDER)},
