@@ -7,6 +7,8 @@ SYSTEM_LIBRARIES := libgl1 libegl1 libopengl0 libusb-1.0-0
 SYSTEM_INSTALL := apt-get install -y --no-install-recommends $(SYSTEM_LIBRARIES)
 # Long tests run in continuous integration, and here with `make test SLOW=1`.
 SLOW ?= $(CI)
+# Test processes side by side, up to 3 GB of memory each; who is through with its tests takes some from another.
+TEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal $(if $(SLOW),--durations=25,-m "not slow")
 
 .PHONY: help setup system demo test check bench sheet clean
 
@@ -36,14 +38,19 @@ system:
 demo: setup
 	$(BIN)/python examples/place_figure.py build/demo
 
+# Where compiled modules may not be kept, each process that a test starts would compile torch and others anew.
+test check: export PYTHONDONTWRITEBYTECODE :=
+# One thread of torch a process: those of several processes wait for each other, and small networks gain nothing.
+test check: export OMP_NUM_THREADS := 1
+
 test: setup
-	$(BIN)/python -m pytest $(if $(SLOW),,-m "not slow")
+	$(TEST)
 
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest $(if $(SLOW),,-m "not slow")
+	$(TEST)
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks.run build/bench.json

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.installing import alone_in, install
 from tests.node import CLIENTS, ROOT
 
 ENVIRONMENT = ROOT / "build" / "blender"
@@ -23,20 +24,17 @@ def blender_python() -> Path:
     """The interpreter that has bpy; made and installed (1.6 GB on the disk, half a minute) on first use."""
     interpreter = ENVIRONMENT / "bin" / "python"
     done = ENVIRONMENT / "installed.json"
-    if not done.is_file() or json.loads(done.read_text()) != list(PACKAGES):
-        name = "python{}.{}".format(*PYTHON)
-        base = sys.executable if sys.version_info[:2] == PYTHON else shutil.which(name)
-        if base is None:
-            pytest.skip(f"bpy needs {name}, which is not there: not looked at in Blender")
-        commands = [
-            [base, "-m", "venv", "--clear", str(ENVIRONMENT)],
-            [str(interpreter), "-m", "pip", "install", "-q", *PACKAGES],
-        ]
-        for command in commands:
-            install = subprocess.run(command, capture_output=True, text=True, check=False, timeout=900)
-            if install.returncode:
-                pytest.skip(f"bpy cannot be installed: {install.stderr.strip()[-200:]}")
-        done.write_text(json.dumps(PACKAGES))
+    with alone_in(ENVIRONMENT):
+        if not done.is_file() or json.loads(done.read_text()) != list(PACKAGES):
+            name = "python{}.{}".format(*PYTHON)
+            base = sys.executable if sys.version_info[:2] == PYTHON else shutil.which(name)
+            if base is None:
+                pytest.skip(f"bpy needs {name}, which is not there: not looked at in Blender")
+            make = [base, "-m", "venv", "--clear", "--without-pip", str(ENVIRONMENT)]
+            made = subprocess.run(make, capture_output=True, text=True, check=False)
+            if problem := made.stderr.strip()[-200:] if made.returncode else install(interpreter, *PACKAGES):
+                pytest.skip(f"bpy cannot be installed: {problem}")
+            done.write_text(json.dumps(PACKAGES))
     return interpreter
 
 

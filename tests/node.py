@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from tests.installing import alone_in
+
 ROOT = Path(__file__).resolve().parents[1]
 CLIENTS = ROOT / "tests" / "clients"
 
@@ -27,17 +29,18 @@ def installed(folder: Path, *names: str) -> Path:
     wanted = {name: versions[name] for name in names}
     manifest = folder / "package.json"
     modules = folder / "node_modules"
-    present = manifest.is_file() and json.loads(manifest.read_text()).get("dependencies") == wanted
-    if not present or not all((modules / name).is_dir() for name in names):
-        folder.mkdir(parents=True, exist_ok=True)
-        manifest.write_text(json.dumps({"private": True, "dependencies": wanted}))
-        # No scripts of packages: none is needed, and they would compile a database for minutes.
-        options = ["--ignore-scripts", "--no-audit", "--no-fund", "--no-package-lock"]
-        command = ["npm", "install", "--prefix", str(folder), *options]
-        install = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=600)
-        if install.returncode:
-            manifest.unlink()  # so that the next run tries again
-            pytest.skip(f"npm cannot install {', '.join(names)}: {install.stderr.strip()[-200:]}")
+    with alone_in(folder):
+        present = manifest.is_file() and json.loads(manifest.read_text()).get("dependencies") == wanted
+        if not present or not all((modules / name).is_dir() for name in names):
+            folder.mkdir(parents=True, exist_ok=True)
+            manifest.write_text(json.dumps({"private": True, "dependencies": wanted}))
+            # No scripts of packages: none is needed, and they would compile a database for minutes.
+            options = ["--ignore-scripts", "--no-audit", "--no-fund", "--no-package-lock"]
+            command = ["npm", "install", "--prefix", str(folder), *options]
+            install = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=600)
+            if install.returncode:
+                manifest.unlink()  # so that the next run tries again
+                pytest.skip(f"npm cannot install {', '.join(names)}: {install.stderr.strip()[-200:]}")
     return modules
 
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import torch
 
-CHUNK = 4_000_000
-"""Pairs of point and triangle that the torch way holds at once."""
+CHUNK, CHUNK_CPU = 4_000_000, 60_000
+"""Pairs of point and triangle that the torch way holds at once; on a CPU as many as its cache has room for."""
 
 
 def signed_distance(
@@ -35,41 +35,61 @@ def signed_distance_torch(
     """As `signed_distance`; brute force over all triangles, the sign from the winding number (Jacobson et al. 2013)."""
     import torch
 
-    corner = torch.as_tensor(np.asarray(vertices, np.float32)[faces], device=device)
-    where = torch.as_tensor(np.asarray(points, np.float32), device=device)
+    corner = np.asarray(vertices, np.float32)[faces].transpose(1, 2, 0)  # (3 corners, 3 axes, F)
+    corners = torch.as_tensor(np.ascontiguousarray(corner), device=device)[:, :, None]
+    where = torch.as_tensor(np.ascontiguousarray(np.asarray(points, np.float32).T), device=device)
     result = []
-    step = max(1, CHUNK // len(corner))
-    for first in range(0, len(where), step):
-        block = where[first : first + step]
-        a, b, c = (corner[None, :, k] - block[:, None] for k in range(3))
-        result.append(torch.where(_winding(a, b, c) > 0.5, -1.0, 1.0) * _distance(a, b, c))
+    step = max(1, (CHUNK_CPU if device == "cpu" else CHUNK) // len(faces))
+    for first in range(0, where.shape[1], step):
+        block = where[:, first : first + step, None]
+        sign = torch.where(_winding(corners - block) > 0.5, -1.0, 1.0)
+        result.append(sign * _distance(corners, block))
     return np.asarray(torch.cat(result).cpu().numpy(), np.float32)
 
 
-def _winding(a: torch.Tensor, b: torch.Tensor, c: torch.Tensor) -> torch.Tensor:
-    """(P,) winding number from triangle corners relative to points, (P, F, 3) each (van Oosterom and Strackee 1983)."""
+def _dot(u: torch.Tensor, v: torch.Tensor) -> torch.Tensor:
+    """Of vectors whose axes come first: so laid out, each axis is one array, and products are those of arrays."""
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+def _cross(u: torch.Tensor, v: torch.Tensor) -> torch.Tensor:
     import torch
 
-    la, lb, lc = (v.norm(dim=-1) for v in (a, b, c))
-    top = (a * torch.linalg.cross(b, c)).sum(-1)
-    bottom = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+    return torch.stack([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
+
+
+def _winding(corners: torch.Tensor) -> torch.Tensor:
+    """(P,) winding number from corners relative to points, (3, 3, P, F) (van Oosterom and Strackee 1983)."""
+    import torch
+
+    a, b, c = corners
+    la, lb, lc = (_dot(v, v).sqrt() for v in (a, b, c))
+    top = _dot(a, _cross(b, c))
+    bottom = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
     return torch.atan2(top, bottom).double().sum(-1) / (2.0 * torch.pi)
 
 
-def _distance(a: torch.Tensor, b: torch.Tensor, c: torch.Tensor) -> torch.Tensor:
-    """(P,) distance of the origin to the nearest triangle: the plane where it projects inside, else an edge."""
+def _distance(corners: torch.Tensor, points: torch.Tensor) -> torch.Tensor:
+    """(P,) distance of points (3, P, 1) to the nearest of triangles (3, 3, 1, F).
+
+    To the plane where the point projects inside of the triangle, else to an edge.
+    """
     import torch
 
-    best = None
-    normal = torch.linalg.cross(b - a, c - a)
-    area2 = (normal * normal).sum(-1).clamp(min=1e-20)
-    inside = torch.ones(a.shape[:-1], dtype=torch.bool, device=a.device)
+    a, b, c = corners
+    normal = _cross(b - a, c - a)
+    area2 = _dot(normal, normal).clamp(min=1e-20)
+    best, inside = None, None
     for p, q in ((a, b), (b, c), (c, a)):
-        edge = q - p
-        t = (-(p * edge).sum(-1) / (edge * edge).sum(-1).clamp(min=1e-20)).clamp(0.0, 1.0)
-        square = (p + t[..., None] * edge).square().sum(-1)
+        edge, away = q - p, p - points
+        t = (-_dot(away, edge) / _dot(edge, edge).clamp(min=1e-20)).clamp(0.0, 1.0)
+        nearest = away + t * edge
+        square = _dot(nearest, nearest)
         best = square if best is None else torch.minimum(best, square)
-        inside &= (torch.linalg.cross(edge, -p) * normal).sum(-1) >= 0
-    plane = (a * normal).sum(-1).square() / area2
+        # edge x (point - p) along the normal
+        left = _dot(_cross(normal, edge), away) <= 0
+        inside = left if inside is None else inside & left
+    plane = _dot(a - points, normal).square() / area2
     assert best is not None
+    assert inside is not None
     return torch.where(inside, torch.minimum(plane, best), best).amin(-1).sqrt()

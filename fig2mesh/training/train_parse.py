@@ -49,6 +49,8 @@ DOODLES: Final = 0.42
 """Share of doodles among what is trained on."""
 
 HELD_OUT: Final = ("valid-clips", "valid-characters")
+VIEWS = 64
+"""Views of each of these that are scored."""
 
 
 def train_parse(
@@ -93,7 +95,7 @@ def train_parse(
     viewer = Viewer(joined(*parts), seed)
     parts.clear()
     held = [Viewer(load_crops(data, split, most=1), seed + 1, grounds=40) for split in HELD_OUT]
-    views = [_fixed(viewer_, 64) for viewer_ in held]
+    views = [_fixed(viewer_, VIEWS) for viewer_ in held]
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         rng = np.random.default_rng(int(torch.randint(2**62, (), generator=generator)))

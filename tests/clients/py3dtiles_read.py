@@ -1,4 +1,4 @@
-"""What py3dtiles, a reader that shares no code with ours, finds in a tileset; runs in an environment of its own.
+"""What py3dtiles, a reader that shares no code with ours, finds in a tileset of many figures.
 
 python py3dtiles_read.py TILESET_JSON
 stdout: {version, tiles, contents: {uri: {kind, vertices, batch}}}; uri as its tile has it

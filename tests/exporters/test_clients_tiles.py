@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,36 +15,13 @@ from exporters.tileset_tree import tileset_documents
 from exporters.write import write
 from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.placement import GeoPlacement
+from tests import py3dtiles
 from tests.exporters.analytic import ZURICH, asset, capsule
 from tests.exporters.test_clients import HEADINGS, PLACES
 from tests.exporters.test_tileset_tree import HIGH, LOW, crowd
-from tests.node import ROOT, RunScript
-
-PY3DTILES = "12.1.1"
+from tests.node import RunScript
 
 SMALL = (capsule(8, 2),)
-
-
-@pytest.fixture(scope="session")
-def py3dtiles() -> Callable[[Path], Any]:
-    """What tests/clients/py3dtiles_read.py prints; in an environment of its own, as it wants an older NumPy."""
-    folder = ROOT / "build" / "py3dtiles"
-    python = folder / ("Scripts" if sys.platform == "win32" else "bin") / "python"
-    version = "import importlib.metadata as m; print(m.version('py3dtiles'))"
-    known = subprocess.run([python, "-c", version], capture_output=True, text=True) if python.exists() else None
-    if known is None or known.stdout.strip() != PY3DTILES:
-        pip = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", f"py3dtiles=={PY3DTILES}"]
-        for command in ([sys.executable, "-m", "venv", folder], pip):
-            done = subprocess.run(command, capture_output=True, text=True)
-            if done.returncode:
-                pytest.skip(f"py3dtiles cannot be installed: {done.stderr.strip()[-200:]}")
-
-    def read(tileset: Path) -> Any:
-        script = ROOT / "tests" / "clients" / "py3dtiles_read.py"
-        done = subprocess.run([python, script, tileset], capture_output=True, text=True, check=True)
-        return json.loads(done.stdout)
-
-    return read
 
 
 @pytest.fixture
@@ -195,9 +168,9 @@ def test_tiles_tools_reads_version_1_0(four: Path, tmp_path: Path, tiles_tools: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["1.0", "1.1"])
-def test_py3dtiles_reads_many(four: Path, tmp_path: Path, py3dtiles: Callable[[Path], Any], version: Any) -> None:
+def test_py3dtiles_reads_many(four: Path, tmp_path: Path, version: str) -> None:
     write_figures([four], tmp_path / "out", version=version)
-    found = py3dtiles(tmp_path / "out" / "tileset.json")
+    found = py3dtiles.read("py3dtiles_read.py", tmp_path / "out" / "tileset.json")
     assert found["version"] == version
     assert found["tiles"] == 7
     assert len(found["contents"]) == 6

@@ -17,8 +17,9 @@ def model(*bodies: trimesh.Trimesh) -> TexturedMesh:
     return TexturedMesh(body.vertices, body.faces, body.vertex_normals, np.arange(len(body.vertices)))
 
 
-def ball(radius: float, centre: tuple[float, float, float] = (0, 0, 0)) -> trimesh.Trimesh:
-    body = trimesh.creation.icosphere(5, radius)
+def ball(radius: float, centre: tuple[float, float, float] = (0, 0, 0), halvings: int = 5) -> trimesh.Trimesh:
+    """halvings : of an icosahedron's edges; 3 (1,280 triangles) where topology is looked at and roundness is not"""
+    body = trimesh.creation.icosphere(halvings, radius)
     body.apply_translation(centre)
     return body
 
@@ -162,14 +163,14 @@ def test_quality_of_triangles_by_formula() -> None:
 
 
 def test_laws_of_sound_bodies() -> None:
-    found = laws(model(ball(0.1), trimesh.creation.torus(0.5, 0.1)))
+    found = laws(model(ball(0.1, halvings=3), trimesh.creation.torus(0.5, 0.1)))
     assert (found.closed, found.manifold) == (True, True)
     assert (found.components, found.genus) == (2, 1)
     assert (found.inner_shells, found.crossing, found.turned) == (0, 0, 0.0)
 
 
 def test_a_hole_and_a_turned_triangle_break_the_laws() -> None:
-    body = ball(0.1)
+    body = ball(0.1, halvings=3)
     open_ = laws(TexturedMesh(body.vertices, body.faces[1:], body.vertex_normals, np.arange(len(body.vertices))))
     assert not open_.closed
     faces = np.array(body.faces)
@@ -181,7 +182,7 @@ def test_a_hole_and_a_turned_triangle_break_the_laws() -> None:
 
 
 def test_split_vertices_are_one_solid() -> None:
-    body = ball(0.1)
+    body = ball(0.1, halvings=3)
     corners = np.asarray(body.faces).reshape(-1)
     split = TexturedMesh(
         body.vertices[corners], np.arange(len(corners)).reshape(-1, 3), body.vertex_normals[corners], corners
@@ -191,23 +192,24 @@ def test_split_vertices_are_one_solid() -> None:
 
 
 def test_inner_shells_are_cavities_and_bodies_within_bodies() -> None:
-    cavity = ball(0.05)
+    cavity = ball(0.05, halvings=3)
     cavity.invert()
 
     def count(*bodies: trimesh.Trimesh) -> int:
         return inner_shells(solid_mesh(model(*bodies)))
 
-    assert count(ball(0.1), ball(0.1, (0.3, 0, 0))) == 0
-    assert count(ball(0.1), ball(0.05)) == 1
-    assert count(ball(0.1), cavity) == 1
-    assert count(ball(0.1), ball(0.05), ball(0.02)) == 2
+    large, small = ball(0.1, halvings=3), ball(0.05, halvings=3)
+    assert count(large, ball(0.1, (0.3, 0, 0), halvings=3)) == 0
+    assert count(large, small) == 1
+    assert count(large, cavity) == 1
+    assert count(large, small, ball(0.02, halvings=3)) == 2
 
 
 def test_crossing_triangles_are_where_two_surfaces_meet() -> None:
-    assert crossing_triangles(solid_mesh(model(ball(0.1)))) == 0
-    body = solid_mesh(model(ball(0.1), ball(0.1, (0.1, 0, 0))))
+    assert crossing_triangles(solid_mesh(model(ball(0.1, halvings=4)))) == 0
+    body = solid_mesh(model(ball(0.1, halvings=4), ball(0.1, (0.1, 0, 0), halvings=4)))
     found = crossing_triangles(body)
-    # A circle of 87 mm radius through triangles of some 3.5 mm, on both spheres.
+    # A circle of 87 mm radius through triangles of some 7 mm, on both spheres.
     edge = np.linalg.norm(body.vertices[body.faces[:, 0]] - body.vertices[body.faces[:, 1]], axis=1).mean()
     around = 2 * np.pi * 0.0866 / edge
     assert around < found < 6 * around

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ def worst(request: pytest.FixtureRequest) -> Iterator[Worst]:
     case: Case = mark.args[0]
     measured = Worst(case)
     yield measured
-    request.node.user_properties.append(("hard_case", (request.node.originalname, case, measured.value)))
+    request.node.user_properties.append(("hard_case", (request.node.originalname, asdict(case), measured.value)))
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ class Collector:
                 continue
             name, case, worst = value
             module = Path(report.nodeid.partition("::")[0]).stem
-            row = self.rows.setdefault((module, name), Row(module, name, case))
+            row = self.rows.setdefault((module, name), Row(module, name, Case(**case)))
             row.inputs += 1
             row.worst = max((w for w in (row.worst, worst) if w is not None), default=None)
             outcome, note = self.outcomes.get(report.nodeid, ("failed", ""))

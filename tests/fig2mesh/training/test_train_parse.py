@@ -83,7 +83,9 @@ def test_no_crops_is_said_in_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_short_run_writes_weights_and_scores(data: Path) -> None:
+def test_a_short_run_writes_weights_and_scores(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # As many as there are doodles: none is scored twice.
+    monkeypatch.setattr("fig2mesh.training.train_parse.VIEWS", 6)
     scores = train_parse(data, data / "run", steps=2, batch=2)
     _, facts = read_parser(parser_path(data / "run"))
     assert facts["steps"] == 2
