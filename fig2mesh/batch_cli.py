@@ -37,12 +37,13 @@ from fig2mesh.figure_options import FILE, messages
 @click.option("--root", type=FILE, metavar="DIR", help="Folder that rows' files may not leave; default: COLLECTION's.")
 @click.option("--layer", metavar="NAME", help="Of a GeoPackage; default: the one with a column figure.")
 @click.option("--unplaced", is_flag=True, help="Rows need no place on the earth.")
+@click.option("--date", metavar="DATE", help="Of rows that have none: 1893, 1893-05-17, 1893/1895; for the catalogue.")
 @click.option("--title", metavar="TEXT", help="Of the catalogue; default: COLLECTION's stem.")
 @click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="Of the tileset.")
 @click.option("--overwrite", is_flag=True, help="Replace files in DIR that are not of an earlier batch.")
 @messages
 @click.pass_context
-def batch(context: click.Context, /, formats: tuple[str, ...], **options: Any) -> int:
+def batch(context: click.Context, /, formats: tuple[str, ...], date: str | None, **options: Any) -> int:
     """Convert a collection of figures.
 
     COLLECTION is a CSV, GeoJSON or GeoPackage with a row for each figure: figure (its picture, seen from COLLECTION's
@@ -59,6 +60,8 @@ def batch(context: click.Context, /, formats: tuple[str, ...], **options: Any) -
     defaults = given_defaults(context)
     if formats:
         defaults["format"] = formats
+    if date is not None:
+        defaults["date"] = date
     return run(**{name: value for name, value in options.items() if name not in names}, defaults=defaults)
 
 

@@ -5,6 +5,7 @@ https://distributed.dask.org/en/stable/
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import queue
@@ -26,11 +27,14 @@ TOPIC: Final = "fig2mesh"
 AHEAD: Final = 2
 """Rows handed out for each thread of a worker: one to work on, one that waits, so that none has to ask."""
 
-ANSWER_S: Final = 15.0
+ANSWER_S: Final = 10.0
 """How long a scheduler may take to answer at first."""
 
 WORKERS_S: Final = 60.0
 """How long to wait for the first worker."""
+
+LOOK_S: Final = 5.0
+"""How often to look whether the scheduler is still there."""
 
 _one_at_a_time = threading.Lock()
 """A worker with several threads gives them all to one row: memory is that of a row."""
@@ -108,27 +112,35 @@ class DaskEngine:
 
     def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
         """See `Engine.run`; stages are told by the scheduler's events."""
-        from distributed import as_completed
-
-        stages: queue.SimpleQueue[Stage] = queue.SimpleQueue()
-        self._client.subscribe_topic(TOPIC, lambda event: stages.put(Stage(*event[1])))
+        # Of Dask's futures that have ended, and of stages.
+        notices: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._client.subscribe_topic(TOPIC, lambda event: notices.put(Stage(*event[1])))
         waiting = iter(tasks)
-        given: dict[str, Task] = {}
-        ended = as_completed(with_results=False)
+        given: dict[str, tuple[Task, Any]] = {}
+
+        def give() -> None:
+            for task in itertools.islice(waiting, AHEAD * max(self._threads, 1) - len(given)):
+                future = self._submit(task)
+                given[future.key] = (task, future)
+                future.add_done_callback(notices.put)
+
         try:
-            for task in waiting:
-                ended.add(self._submit(task, given))
-                if len(given) >= AHEAD * max(self._threads, 1):
-                    break
-            for future in ended:
-                task = given.pop(future.key)
-                while not stages.empty():
-                    yield stages.get()
-                yield self._outcome(future, task)
+            give()
+            while given:
+                try:
+                    notice = notices.get(timeout=LOOK_S)
+                except queue.Empty:
+                    if self._client.status != "running":
+                        raise OSError(f"the connection is {self._client.status}") from None
+                    continue
+                if isinstance(notice, Stage):
+                    yield notice
+                    continue
+                task, future = given.pop(notice.key)
+                outcome = self._outcome(future, task)
                 future.release()
-                following = next(waiting, None)
-                if following is not None:
-                    ended.add(self._submit(following, given))
+                give()
+                yield outcome
         except (OSError, TimeoutError) as error:
             reason = " ".join(str(error).split())[:120] or type(error).__name__
             raise InputError(f"--address {self._address}", f"the scheduler is lost ({reason})",
@@ -138,9 +150,8 @@ class DaskEngine:
                 self._client.unsubscribe_topic(TOPIC)
             self._client.close()
 
-    def _submit(self, task: Task, given: dict[str, Task]) -> Any:
+    def _submit(self, task: Task) -> Any:
         key = f"fig2mesh-{task.number}-{secrets.token_hex(4)}"
-        given[key] = task
         # Lower numbers first; a row whose worker is lost comes again before those that were never begun.
         return self._client.submit(_row, self._batch, task, self._dry, key=key, pure=False, priority=-task.number)
 
@@ -158,12 +169,11 @@ class DaskEngine:
         return lost(task, f"lost by the cluster: {text}")
 
 
-def _facts(mark: str) -> Facts:
-    from distributed import get_worker
-
+def _facts(mark: str, dask_worker: Any) -> Facts:
+    """Runs on every worker; dask_worker : which one, given by Dask to functions with such a parameter."""
     from fig2mesh.batch.keys import fingerprint
 
-    return Facts(fingerprint(), os.path.exists(mark), get_worker().state.nthreads)
+    return Facts(fingerprint(), os.path.exists(mark), dask_worker.state.nthreads)
 
 
 def _row(batch: Batch, task: Task, dry: bool) -> Outcome:

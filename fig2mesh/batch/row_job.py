@@ -7,7 +7,6 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +24,9 @@ if TYPE_CHECKING:
     from exporters.placed_figure import Attributes
     from exporters.profiles import Profile
     from fig2mesh.place import Placed
+
+UNKNOWN_DATE = "0001/9999"
+"""A catalogue must have a date; when a file was changed says nothing of the drawing, and is lost by copying."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -76,6 +78,8 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
             record |= {"status": "failed", "error": batch.roots.shorten(found), "ours": True}
         record["full"] = fault is not None and _full(fault)
         record["seconds"] = round(time.perf_counter() - start, 3)
+        if before is not None and record | {"seconds": before.get("seconds")} == before:
+            return _outcome(task, before)  # it failed as it did before
         ledger.write(task.name, record)
     except OSError as error:
         record |= {"status": "failed", "error": f"its record cannot be kept ({error.strerror})"}
@@ -176,7 +180,7 @@ def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[s
         "placement": None if asset.placement is None else asdict(asset.placement),
         "map": placed.map,
         "notes": _notes(request, placed, specks, measures),
-        "date": request.options.date or _changed(request.values["figure"]),
+        "date": request.options.date or UNKNOWN_DATE,
         "work": {"ran": cache.ran, "reused": cache.reused, "counts": {k: n for k, n in counts.items() if n}},
     }
     if asset.placement is not None:
@@ -230,10 +234,3 @@ def _plain(attributes: Mapping[str, Value]) -> Attributes:
     return plain_attributes(
         {name: ", ".join(map(str, value)) if isinstance(value, tuple) else value for name, value in attributes.items()}
     )
-
-
-def _changed(path: Path) -> str:
-    """When a file was last changed, ISO 8601, to the second."""
-    with suppress(OSError, ValueError, OverflowError):
-        return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(int(path.stat().st_mtime)))
-    return "1970-01-01T00:00:00Z"

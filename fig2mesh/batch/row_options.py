@@ -139,7 +139,7 @@ def options_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: s
     return RowOptions(
         context.params,
         tuple(_listed(formats)),
-        str(values["date"]) if "date" in values else None,
+        None if (date := values.get("date", defaults.get("date"))) is None else str(date),
         {column: value for column, value in values.items() if not is_known(column)},
     )
 

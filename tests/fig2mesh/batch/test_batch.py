@@ -174,9 +174,9 @@ def _command(collection: Path, out: Path) -> list[str]:
 def test_killed_at_any_moment_a_rerun_ends_with_the_same_bytes(
     collection: Path, converted: Path, tmp_path: Path
 ) -> None:
-    """The whole group is killed ten times, each after a random number of events: stages and ends of rows."""
+    """The whole group is killed six times, each after a random number of events: stages and ends of rows."""
     chance = random.Random(7)
-    for _ in range(10):
+    for _ in range(6):
         process = subprocess.Popen(
             _command(collection, tmp_path), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True
         )
