@@ -1,7 +1,7 @@
-"""Throughput of `fig2mesh batch`: `python -m tests.benchmarks.batch [--rows N] [--grow N ...] [--quality Q] OUT.json`.
+"""Throughput of `fig2mesh batch`: `python -m tests.benchmarks.batch [--rows N] [--grow N ...] [--dry N ...] OUT.json`.
 
-The rows are the shipped figures over and over, each with a seed of its own, so that every row is worked on from its
-points on, or (--grow) with a place of its own only, which shows what a row costs besides its conversion.
+The rows are the shipped figures over and over, each with a seed of its own, so that every row is converted but for its
+reading; or (--grow, --dry) with a place of its own only, which shows what a row costs besides its conversion.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -21,38 +20,48 @@ FIGURES = Path(__file__).parents[2] / "examples" / "figures"
 NAMES = ("farmer", "footballer", "market_woman")
 
 
+PARENT = """
+import json, resource, sys
+from fig2mesh.cli import main
+code = main(sys.argv[1:])
+print(json.dumps({"event": "memory", "kb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}))
+raise SystemExit(code)
+"""
+"""The command line, and after it the largest resident size of its process alone, without workers."""
+
+
 def write_rows(path: Path, count: int, quality: str, seeds: bool) -> Path:
-    """A collection of `count` rows."""
+    """A collection of `count` rows; seeds : each with a conversion of its own, else with a place of its own only."""
     with path.open("w", encoding="utf-8", newline="") as stream:
         table = csv.writer(stream)
-        table.writerow(["name", "figure", "keypoints", "lon", "lat", "quality", "seed"])
+        table.writerow(["name", "figure", "keypoints", "lon", "lat", "quality", "seed", "parts", "textures"])
         for number in range(count):
             folder = FIGURES / NAMES[number % len(NAMES)]
             place = (round(8 + number % 100 / 1000, 6), round(47 + number // 100 / 1000, 6))
-            seed = number if seeds else 0
-            table.writerow([f"f{number}", folder / "image.png", folder / "keypoints.json", *place, quality, seed])
+            rest = (number, "network", "network") if seeds else (0, "outline", "none")
+            table.writerow([f"f{number}", folder / "image.png", folder / "keypoints.json", *place, quality, *rest])
     return path
 
 
-def convert(collection: Path, out: Path, jobs: int) -> dict[str, Any]:
+def convert(collection: Path, out: Path, jobs: int, *more: str) -> dict[str, Any]:
     """Convert a collection; seconds as a whole, figures a minute of all and of those after each worker's first."""
-    command = [sys.executable, "-m", "fig2mesh", "batch", str(collection), "-o", str(out), "--jobs", str(jobs),
-               "--root", str(FIGURES), "--progress", "json", "-q"]  # fmt: skip
+    words = ["batch", str(collection), "-o", str(out), "--jobs", str(jobs), "--root", FIGURES.anchor,
+             "--progress", "json", "-q", *more]  # fmt: skip
+    command = [sys.executable, "-c", PARENT, *words]
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    ends = [event["t"] for line in process.stdout if (event := json.loads(line))["event"] == "row"]
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    seconds = time.perf_counter() - start
-    if process.returncode:
+    events = [json.loads(line) for line in process.stdout]
+    if process.wait():
         raise SystemExit(f"batch ended with {process.returncode}")
+    seconds = time.perf_counter() - start
+    ends = [event["t"] for event in events if event["event"] == "row"]
     later = ends[jobs:]
     return {
         "rows": len(ends), "jobs": jobs, "seconds": round(seconds, 2),
         "per_minute": round(60 * len(ends) / seconds, 2),
         "warm_per_minute": round(60 * len(later) / (later[-1] - ends[jobs - 1]), 2) if later else None,
-        "parent_mb": round(usage.ru_maxrss / 1024, 1),
+        "parent_mb": round(events[-1]["kb"] / 1024, 1),
     }  # fmt: skip
 
 
@@ -79,11 +88,20 @@ def growth(folder: Path, counts: list[int], quality: str) -> list[dict[str, Any]
     return found
 
 
+def dry(folder: Path, counts: list[int]) -> list[dict[str, Any]]:
+    """Rows that are only checked: what the parent takes, however many they are."""
+    return [
+        convert(write_rows(folder / f"dry{count}.csv", count, "draft", seeds=False), folder, 2, "--dry-run")
+        for count in counts
+    ]
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("output", type=Path)
     parser.add_argument("--rows", type=int, default=12)
     parser.add_argument("--grow", type=int, nargs="*", default=[])
+    parser.add_argument("--dry", type=int, nargs="*", default=[])
     parser.add_argument("--quality", default="draft")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -93,5 +111,8 @@ if __name__ == "__main__":
             print(json.dumps(result["speedup"], indent=1))
         if options.grow:
             result["growth"] = growth(Path(name), options.grow, options.quality)
+        if options.dry:
+            result["dry"] = dry(Path(name), options.dry)
+            print(json.dumps(result["dry"], indent=1))
     options.output.parent.mkdir(parents=True, exist_ok=True)
     options.output.write_text(json.dumps(result, indent=2) + "\n")

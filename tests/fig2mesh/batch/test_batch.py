@@ -19,6 +19,7 @@ import pytest
 from exporters.validate import validate
 from fig2mesh.batch.ledger import WORK
 from fig2mesh.cli import main
+from tests.benchmarks.batch import convert
 from tests.fig2mesh.batch.small import QUICK, events, manifest, tree, write_csv, write_pictures
 
 pytestmark = pytest.mark.slow
@@ -218,3 +219,14 @@ def test_a_row_that_takes_too_long_is_given_up(collection: Path, tmp_path: Path,
     assert main(["batch", str(slow), "-o", str(tmp_path), "--timeout", "1"]) == 1
     assert "took more than 1 s; raise --timeout" in capsys.readouterr().err
     assert manifest(tmp_path)[0]["error"] == "took more than 1 s; raise --timeout"
+
+
+def test_the_parent_needs_no_more_memory_for_more_rows(tmp_path: Path) -> None:
+    rows = write_pictures(tmp_path, 1)
+    peaks = {}
+    for count in (100, 2000):
+        table = write_csv(tmp_path / f"{count}.csv", [{**rows[0], "year": n} for n in range(count)])
+        found = convert(table, tmp_path / "out", 2, "--dry-run")
+        assert found["rows"] == count
+        peaks[count] = found["parent_mb"]
+    assert peaks[2000] < 1.1 * peaks[100]
