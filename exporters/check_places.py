@@ -6,7 +6,6 @@ https://github.com/AnalyticalGraphicsInc/czml-writer/wiki/CZML-Structure
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +22,7 @@ from exporters.findings import Finding
 from exporters.georeference import placement_of_record
 from exporters.glb_container import open_glb
 from georef.geodesy import ecef_from_geodetic
+from georef.json_file import read_json
 from georef.placement import GeoPlacement
 
 GEOMETRIES = {
@@ -37,10 +37,7 @@ HEIGHT_REFERENCES = {
 
 
 def _document(path: Path) -> Any:
-    try:
-        return json.loads(path.read_bytes())
-    except (OSError, ValueError) as error:
-        raise ExportError(path, f"no readable JSON ({error})", "write it again") from error
+    return read_json(path, "write it again", ExportError)
 
 
 def check_geojson(path: Path) -> list[Finding]:

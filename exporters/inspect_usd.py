@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.check_usd import open_stage, variations
-from exporters.facts import file_sizes, solid_facts, texture_size
+from exporters.facts import file_sizes, solid_facts
+from exporters.texture_files import texture_size
 from exporters.usd import VARIANT_SET
 from exporters.usd_place import anchor_of, heading_of
+from georef.json_file import parse_json
 
 FORMATS = {".usda": "OpenUSD text", ".usdc": "OpenUSD binary", ".usdz": "OpenUSD package"}
 
@@ -30,7 +31,7 @@ def usd_facts(path: Path) -> dict[str, Any]:
         "name": facts.get("name"),
         "copyright": facts.get("copyright"),
         "generator": facts.get("generator"),
-        "metadata": json.loads(metadata) if isinstance(metadata, str) else None,
+        "metadata": parse_json(metadata) if isinstance(metadata, str) else None,
         "placement": _placement(stage.GetDefaultPrim(), dict(facts.get("georeference", {}))),
     }
     lods = []

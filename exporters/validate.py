@@ -12,9 +12,10 @@ from exporters.check_gltf import check_gltf
 from exporters.check_places import check_czml, check_geojson
 from exporters.check_tiles import check_tileset
 from exporters.check_usd import check_usd
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.findings import Finding, check_solid
 from exporters.solid import merged_by_position
+from exporters.triangle_files import check_triangle_file, references_of
 
 __all__ = ["Finding", "read_triangles", "validate"]
 
@@ -32,7 +33,7 @@ def validate(path: str | os.PathLike[str], external: bool = True) -> list[Findin
         raise ExportError(path, "is not there", "check the name")
     try:
         findings = _check_any(path, external)
-    except (AttributeError, ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         if isinstance(error, ExportError):
             raise
         # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
@@ -62,6 +63,7 @@ def read_triangles(path: Path) -> Any:
     """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
     import trimesh
 
+    check_triangle_file(path)
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
     except Exception as error:  # trimesh lets whatever its parsers meet through
@@ -87,17 +89,8 @@ def _check_triangles(path: Path) -> list[Finding]:
 
 def _check_references(path: Path) -> list[Finding]:
     """Files that an OBJ and its material libraries name but that are not there."""
-    missing = []
-    pending = [(path, "mtllib")]
-    while pending:
-        file, keyword = pending.pop()
-        for line in file.read_text(errors="replace").splitlines():
-            word, _, name = line.strip().partition(" ")
-            if word != keyword:
-                continue
-            target = file.parent / name.strip()
-            if not target.is_file():
-                missing.append(Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}"))
-            elif word == "mtllib":
-                pending.append((target, "map_Kd"))
-    return missing
+    return [
+        Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
+        for file, word, name, target in references_of(path)
+        if not target.is_file()
+    ]

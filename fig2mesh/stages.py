@@ -10,15 +10,20 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import zipfile
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from exporters.errors import DAMAGE
 from fig2mesh.errors import FigureError, OutputError
+from fig2mesh.record_types import check_fields, fits
 from fig2mesh.settings import STAGES
+from fig2mesh.stage_arrays import read_arrays, text_of
+from georef.json_file import parse_json
+
+REMEDY = "run again with --save-stages and without --resume-from"
 
 
 def _classes() -> dict[str, type]:
@@ -34,6 +39,19 @@ def _classes() -> dict[str, type]:
         for name, value in vars(module).items()
         if isinstance(value, type) and dataclasses.is_dataclass(value)
     }
+
+
+def _kinds() -> dict[str, Any]:
+    """What each stage that is kept makes; "request" is what was asked for."""
+    from fig2mesh.mesh.bake import Baked
+    from fig2mesh.mesh.solid import Solid
+    from fig2mesh.parts.outline import Outline
+    from fig2mesh.records import Mesh, PointCloud, Pose3D, UvMesh
+
+    return {
+        "lift": Pose3D, "parts": Outline, "cloud": PointCloud, "solid": Solid, "simplify": tuple[Mesh, ...],
+        "unwrap": tuple[UvMesh, ...], "bake": tuple[Baked, ...], "request": dict[str, Any],
+    }  # fmt: skip
 
 
 def save_stage(folder: Path, stage: str, value: object) -> None:
@@ -64,15 +82,20 @@ def load_stage(folder: Path, stage: str) -> Any:
     """Read what `save_stage` wrote."""
     path = folder / f"{stage}.npz"
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if str(archive["__stage__"]) != stage:
-                raise ValueError(f"it holds {archive['__stage__']}")
-            return _unpack(json.loads(str(archive["__tree__"])), archive, _classes())
+        arrays = read_arrays(path)
+        if (found := text_of(arrays.pop("__stage__"))) != stage:
+            raise ValueError(f"it holds {found[:40]}")
+        value = _unpack(parse_json(text_of(arrays.pop("__tree__"))), arrays, _classes())
+        if stage in (kinds := _kinds()) and not fits(value, kinds[stage]):
+            raise TypeError(f"it holds a {type(value).__name__}")
+        return value
     except FileNotFoundError:
         raise FigureError(path, "no such file", "run once with --save-stages and without --resume-from") from None
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-        found = f"not a stage file of this version ({' '.join(str(error).split())[:80]})"
-        raise FigureError(path, found, "run again with --save-stages and without --resume-from") from None
+    except OSError as error:
+        raise FigureError(path, error.strerror or "cannot be read", REMEDY) from None
+    except DAMAGE as error:
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
+        raise FigureError(path, f"not a stage file of this version ({reason})", REMEDY) from None
 
 
 def _pack(value: Any, arrays: dict[str, Any]) -> Any:
@@ -92,14 +115,20 @@ def _pack(value: Any, arrays: dict[str, Any]) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be kept in a stage file")
 
 
-def _unpack(tree: Any, archive: Any, classes: dict[str, type]) -> Any:
+def _unpack(tree: Any, arrays: dict[str, Any], classes: dict[str, type]) -> Any:
+    if not isinstance(tree, dict):
+        raise TypeError(f"a {type(tree).__name__} in its tree")
     if "record" in tree:
-        fields = {name: _unpack(item, archive, classes) for name, item in tree["fields"].items()}
-        return classes[tree["record"]](**fields)
+        kind = classes[tree["record"]]
+        fields = {name: _unpack(item, arrays, classes) for name, item in tree["fields"].items()}
+        check_fields(kind, fields)
+        return kind(**fields)
     if "array" in tree:
-        return archive[tree["array"]]
+        return arrays[tree["array"]]
     if "tuple" in tree:
-        return tuple(_unpack(item, archive, classes) for item in tree["tuple"])
+        return tuple(_unpack(item, arrays, classes) for item in tree["tuple"])
     if "dict" in tree:
-        return {key: _unpack(item, archive, classes) for key, item in tree["dict"]}
+        return {key: _unpack(item, arrays, classes) for key, item in tree["dict"]}
+    if isinstance(tree["value"], dict | list):
+        raise TypeError("a value that is none")
     return tree["value"]

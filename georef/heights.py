@@ -64,7 +64,7 @@ def grid_path(datum: str | Path) -> Path | None:
     return path
 
 
-@functools.cache
+@functools.lru_cache(maxsize=16)  # each keeps its file open
 def _shift(path: Path, modified_ns: int) -> Transformer:
     from pyproj import Transformer
 

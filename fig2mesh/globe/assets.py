@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import unquote, urlsplit
 
+from exporters.errors import DAMAGE
 from exporters.georeference import placement_of_record
 from exporters.gltf_reader import Gltf, read_gltf
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
+from georef.json_file import read_json
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
@@ -81,7 +83,7 @@ def _read(path: Path) -> GlobeAsset:
         found = {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
         json.dumps(found.facts, allow_nan=False)  # files may hold numbers that no page can
         return found
-    except (AttributeError, KeyError, IndexError, TypeError, ValueError, RecursionError) as error:
+    except DAMAGE as error:
         if isinstance(error, InputError):
             raise
         reason = " ".join(str(error).split())[:120]
@@ -183,10 +185,7 @@ def _geojson(path: Path) -> GlobeAsset:
 
 
 def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_bytes())
-    except ValueError as error:
-        raise InputError(path, f"is no JSON ({error})", "write it again") from error
+    return read_json(path, "write it again")
 
 
 def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:

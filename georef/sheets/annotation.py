@@ -7,13 +7,13 @@ the projection of the sheet, is an addition of Allmaps'.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from georef.errors import PlacementError
+from georef.json_file import parse_json
 from georef.sheets.controls import MAX_POINTS, Controls, make_controls, read_text
 
 GEOREFERENCING = "georeferencing"
@@ -65,9 +65,11 @@ def read_annotation(path: Path) -> Controls:
 
 def _parsed(path: Path) -> Any:
     try:
-        return json.loads(read_text(path))
-    except (json.JSONDecodeError, RecursionError):
-        raise PlacementError(path, "it is no JSON", "give a IIIF Georeference annotation") from None
+        return parse_json(read_text(path))
+    except PlacementError:
+        raise
+    except ValueError as error:
+        raise PlacementError(path, str(error), "give a IIIF Georeference annotation") from None
 
 
 def _annotations(document: Any) -> Iterator[dict[str, Any]]:

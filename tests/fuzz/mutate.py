@@ -1,4 +1,4 @@
-"""Damage to files, by chance but the same for the same seed: bytes, texts, JSON documents, chunks and tables of fields."""
+"""Damage to files, by chance but the same for the same seed: bytes, texts, JSON, chunks and tables of fields."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ NUMBERS: tuple[Any, ...] = (
     0, -1, 1, 2, 255, 65535, 2**31 - 1, 2**31, 2**32, 2**53, 2**63, 2**64, 10**30, 10**400, -(2**63), 0.5, -0.0, 1e-320,
     1e308, -1e308, float("inf"), float("-inf"), float("nan"), 1e9, 1e18, 5126,
 )  # fmt: skip
-WORDS = ("nan", "inf", "-inf", "1e308", "-1e999", "0", "-1", "1e-320", "2147483648", "9" * 400, "0x10", "1_0", "1,5", "٣",
-         "", "true", "null", "\0", "\ufeff", "é", "#", '"', "\\")  # fmt: skip
+WORDS = ("nan", "inf", "-inf", "1e308", "-1e999", "0", "-1", "1e-320", "2147483648", "9" * 400, "0x10", "1_0", "1,5",
+         "٣", "", "true", "null", "\0", "\ufeff", "é", "#", '"', "\\")  # fmt: skip
 TEXTS: tuple[str, ...] = (
     "", "x" * 20_000, "\0", "\ud800", "../../../../etc/passwd", "/dev/zero", "a/" * 2000, "%00", "%2e%2e%2f", "data:,",
     "data:image/png;base64,AAAA", "http://localhost/a", "\x1b[2J\n\n", "<svg>", "main.json", "main.glb", "POSITION",
@@ -282,6 +282,11 @@ def damaged_tiff(data: bytes, rng: random.Random) -> bytes:
     return bytes(found)
 
 
+def _npy_head(kind: str, shape: str) -> bytes:
+    text = f"{{'descr': {kind}, 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
+    return b"\x93NUMPY\1\0" + struct.pack("<H", len(text)) + text
+
+
 def damaged_zip(data: bytes, rng: random.Random) -> bytes:
     """An archive of .npy and JSON members: other members, heads that lie, or any bytes."""
     if rng.random() < 0.25:
@@ -300,8 +305,7 @@ def damaged_zip(data: bytes, rng: random.Random) -> bytes:
     elif kind == 3 and body[:6] == b"\x93NUMPY":
         shape = rng.choice(("(999999999999,)", "(-1,)", "(3, 3)", "()", "(0,)", "(2, 2, 2, 2)", "(1e9,)", "(True,)"))
         kinds = ("'<f4'", "'<f8'", "'|O'", "'<U9'", "'|b1'", "'<i8'", "'|V9'", "'<c16'", "[('a', '<f4')]", "'<M8[s]'")
-        head = f"{{'descr': {rng.choice(kinds)}, 'fortran_order': False, 'shape': {shape}, }}".encode().ljust(117) + b"\n"
-        members[index] = (name, body[:8] + struct.pack("<H", len(head)) + head + body[128:])
+        members[index] = (name, _npy_head(rng.choice(kinds), shape) + body[128:])
     elif kind == 4 and b"{" in body[128:]:
         text = body[128:].decode("utf-32-le", "replace").rstrip("\0")
         try:
@@ -309,8 +313,7 @@ def damaged_zip(data: bytes, rng: random.Random) -> bytes:
         except ValueError:
             tree = "{}"
         coded = tree.encode("utf-32-le", "replace")
-        head = f"{{'descr': '<U{len(tree)}', 'fortran_order': False, 'shape': (), }}".encode().ljust(117) + b"\n"
-        members[index] = (name, body[:8] + struct.pack("<H", len(head)) + head + coded)
+        members[index] = (name, _npy_head(f"'<U{len(tree)}'", "()") + coded)
     else:
         members[index] = (name, damaged_bytes(body, rng))
     stream = io.BytesIO()

@@ -105,7 +105,8 @@ def read_tiles(path: Path) -> None:
     check(path)
     with suppress(InputError):
         look(path)
-    list(read_figures(path))
+    with suppress(InputError):
+        list(read_figures(path))
 
 
 def read_glb(path: Path) -> None:
@@ -140,8 +141,8 @@ def read_stage(path: Path) -> None:
     from fig2mesh.stages import load_stage
 
     beside = path.with_name("stage")
-    stage = beside.read_text() if beside.is_file() else "lift"
-    stage = stage if stage.isalpha() and stage.isascii() else "lift"
+    stage = beside.read_bytes().decode("ascii", "ignore") if beside.is_file() else "lift"
+    stage = stage if stage.isalpha() else "lift"
     shutil.copyfile(path, path.with_name(f"{stage}.npz"))
     load_stage(path.parent, stage)
 
@@ -175,7 +176,7 @@ def globe_inputs() -> Iterator[Input]:
 
 READERS: dict[str, Reader] = {
     "joints": Reader(seeds.joints, read_joints, 2),
-    "picture": Reader(seeds.pictures, read_picture, 2, 2048),
+    "picture": Reader(seeds.pictures, read_picture, 2, 2560),
     "window": Reader(seeds.scans, read_scan, 1, 2048),
     "world-file": Reader(seeds.world_files, read_map),
     "points": Reader(seeds.points_files, read_map),

@@ -43,7 +43,10 @@ class Tally:
     findings: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, text: str, number: int) -> None:
-        self.findings.setdefault(text, []).append(number)
+        """Findings of the same kind at the same place are one, whatever their message says."""
+        kind, place = text.partition(":")[0], text.rpartition("@")[2]
+        known = next((k for k in self.findings if (k.partition(":")[0], k.rpartition("@")[2]) == (kind, place)), text)
+        self.findings.setdefault(known, []).append(number)
 
 
 def fuzz(name: str, seed: int, inputs: int, seconds: float) -> Tally:
@@ -64,11 +67,23 @@ def fuzz(name: str, seed: int, inputs: int, seconds: float) -> Tally:
     return tally
 
 
-def _process(name: str, seed: int, first: int, last: int, folder: Path, seconds: float, tally: Tally) -> tuple[int, str]:
+def _process(
+    name: str, seed: int, first: int, last: int, folder: Path, seconds: float, tally: Tally
+) -> tuple[int, str]:
     """The number of the last input and "", or what killed the process there."""
     at = folder / "at"
     at.write_bytes(first.to_bytes(8, "little"))
-    words = [sys.executable, "-m", "tests.fuzz.worker", name, str(seed), str(first), str(last), str(folder), str(seconds)]
+    words = [
+        sys.executable,
+        "-m",
+        "tests.fuzz.worker",
+        name,
+        str(seed),
+        str(first),
+        str(last),
+        str(folder),
+        str(seconds),
+    ]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT),
                                 "VIPS_CONCURRENCY": "1", "TMPDIR": str(folder)}  # fmt: skip
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=environment)
@@ -136,7 +151,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, default=ROOT / "build" / "fuzz", help="folder for what is found")
     options = parser.parse_args()
-    print(f"{'reader':<12}{'inputs':>8}{'accepted':>10}{'refused':>9}{'findings':>10}{'a second':>10}{'slowest':>9}{'peak':>9}")
+    print("reader        inputs  accepted  refused  findings  a second  slowest     peak")
     total = found = 0
     for name in options.reader or READERS:
         tally = fuzz(name, options.seed, int(options.inputs * READERS[name].weight), options.seconds)

@@ -194,7 +194,7 @@ def geotiffs() -> Iterator[Input]:
         {33922: tuple(map(float, points))},
     ):
         yield alone(
-            ".tif", saved(Image.new("L", (40, 30), 200), "TIFF", tiffinfo=tags | {34735: keys, 34737: "CH1903+|"})
+            ".tif", saved(Image.new("1", sheets.SIZE), "TIFF", tiffinfo=tags | {34735: keys, 34737: "CH1903+|"})
         )
 
 
@@ -202,9 +202,15 @@ def height_grids() -> Iterator[Input]:
     """Geoid grids, GTX and GeoTIFF, about 8 degrees east and 47 north."""
     values = np.full((4, 5), 47.5, ">f4") + np.arange(5, dtype=">f4")
     yield alone(".gtx", struct.pack(">4d2i", 46.0, 7.0, 0.5, 0.5, 4, 5) + values.astype(">f4").tobytes())
-    tags = {33550: (0.5, 0.5, 0.0), 33922: (0.0, 0.0, 0.0, 7.0, 47.5, 0.0),
-            34735: (1, 1, 0, 3, 1024, 0, 1, 2, 1025, 0, 1, 2, 2048, 0, 1, 4979), 42113: "-32767"}  # fmt: skip
-    yield alone(".tif", saved(Image.fromarray(values.astype(np.float32)), "TIFF", tiffinfo=tags))
+    import rasterio
+
+    shape: dict[str, Any] = {"height": 4, "width": 5, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}
+    transform = rasterio.transform.from_origin(6.75, 47.75, 0.5, 0.5)
+    with rasterio.MemoryFile() as memory:
+        with memory.open(driver="GTiff", transform=transform, **shape) as grid:
+            grid.write(values.astype("<f4"), 1)
+            grid.update_tags(TYPE="VERTICAL_OFFSET_GEOGRAPHIC_TO_VERTICAL")
+        yield alone(".tif", memory.read())
 
 
 def written(name: str, **changes: Any) -> Input:
@@ -229,14 +235,13 @@ def written(name: str, **changes: Any) -> Input:
 
 def compressed_glb() -> Input:
     """A GLB with quantised, compressed buffer views."""
-    from exporters.profiles import PROFILES  # noqa: F401 - the name must exist
-
     import tempfile
 
+    from exporters.profiles import PROFILES
     from exporters.write import write
 
     with tempfile.TemporaryDirectory() as folder:
-        write(asset(PLACE, lods=(body(),)), Path(folder) / "main.glb", profile="cesiumjs")
+        write(asset(PLACE, lods=(body(),)), Path(folder) / "main.glb", profile=PROFILES["cesiumjs"])
         return alone(".glb", (Path(folder) / "main.glb").read_bytes())
 
 
@@ -317,7 +322,7 @@ def triangle_files() -> Iterator[Input]:
 def models() -> Iterator[Input]:
     """Everything that is drawn as a model."""
     yield from (each for each in glbs() if b"meshopt" not in each.files[each.main])
-    yield from gltfs()
+    yield written("main.gltf")
     yield from triangle_files()
 
 
