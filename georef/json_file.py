@@ -44,13 +44,13 @@ def parse_json(data: bytes | bytearray | memoryview | str) -> Any:
     text = data if isinstance(data, str) else _decoded(bytes(data))
     text = text.removeprefix("\ufeff")
     if _too_deep(text):
-        raise ValueError(f"nested more than {MAX_DEPTH} deep")
+        raise ValueError(f"nested too deeply: more than {MAX_DEPTH} levels")
     try:
         document = json.loads(
             text, object_pairs_hook=_object, parse_int=_whole, parse_float=_number, parse_constant=_constant
         )
     except json.JSONDecodeError as error:
-        raise ValueError(f"no JSON: {error.msg} at line {error.lineno}, column {error.colno}") from None
+        raise ValueError(f"not JSON: {error.msg} at line {error.lineno}, column {error.colno}") from None
     except RecursionError:
         raise ValueError("nested too deeply") from None
     if re.search(r"\\u[dD][89a-fA-F]", text):

@@ -101,7 +101,7 @@ def _model(path: Path) -> GlobeAsset:
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
     facts = {
         "name": path.stem,
-        "credit": asset.get("copyright", ""),
+        "credit": str(asset.get("copyright", "")),
         "metadata": extras.get("metadata", {}),
         # CesiumJS turns models so that they face east at heading 0.
         "place": record | {"entity_heading_deg": cesium_entity_heading_deg(place)},
@@ -173,7 +173,7 @@ def _czml(path: Path) -> GlobeAsset:
         address = model.get("uri") if isinstance(model, dict) else model
         if isinstance(address, str):
             uris.append(address)
-    facts: dict[str, Any] = {"name": packets[0].get("name") or path.stem, "credit": "", "metadata": {}}
+    facts: dict[str, Any] = {"name": str(packets[0].get("name") or path.stem), "credit": "", "metadata": {}}
     return GlobeAsset("czml", path.name, path.parent, tuple(dict.fromkeys(_needed(path, uris))), facts)
 
 

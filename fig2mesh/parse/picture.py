@@ -60,7 +60,7 @@ def _open(path: Path, what: str) -> Image.Image:
     """Open and decode a picture, or say in one line why not."""
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for, a device never end
-            raise FigureError(path, "no plain file", f"give a PNG, JPEG, TIFF or WebP as {what}")
+            raise FigureError(path, "cannot be read (no plain file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
         with warnings.catch_warnings():
             # The limit below is ours and explicit; Pillow's warning would only repeat it.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)

@@ -26,7 +26,7 @@ MAX_PIXELS = 178_956_970
 MAX_PIXELS_A_BYTE = 1000
 """Of larger pictures; a bomb has more. Scans in black and white have 200, JPEGs of nearly empty sheets 80."""
 
-FORMATS = ("PNG", "JPEG", "MPO", "TIFF", "WEBP", "AVIF", "JPEG2000", "GIF", "BMP", "PPM")
+FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "JPEG2000", "GIF", "BMP", "PPM")
 """What drawings and scans come in. Pillow knows forty more, one of which starts another program (EPS)."""
 
 STREAMED = ("PNG", "JPEG", "MPO", "TIFF", "WEBP", "AVIF", "GIF")
@@ -37,7 +37,7 @@ ORIENTATION = 0x0112
 
 
 def is_large(path: Path) -> bool:
-    """Whether a picture can and is worth to be read in part; False too for damaged heads, and where it must be turned."""
+    """Whether a picture is worth reading in part, and can be: not where it must be turned, or its head is damaged."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)

@@ -323,11 +323,28 @@ def damaged_zip(data: bytes, rng: random.Random) -> bytes:
     return stream.getvalue()
 
 
+def damaged_safetensors(data: bytes, rng: random.Random) -> bytes:
+    """A file of parameters: its head as JSON, the facts in it as JSON, or any bytes."""
+    if rng.random() < 0.3:
+        return damaged_bytes(data, rng)
+    (size,) = struct.unpack_from("<Q", data)
+    head = json.loads(data[8 : 8 + size])
+    if rng.random() < 0.5:
+        kinds = head["__metadata__"]
+        key = next(iter(kinds))
+        kinds[key] = damaged_json(kinds[key].encode(), rng).decode("utf-8", "replace")
+        text = json.dumps(head).encode()
+    else:
+        text = damaged_json(json.dumps(head).encode(), rng)
+    text += b" " * (-len(text) % 8)
+    return struct.pack("<Q", len(text)) + text + data[8 + size :]
+
+
 BY_SUFFIX: dict[str, Mutation] = {
     ".json": damaged_json, ".geojson": damaged_json, ".czml": damaged_json, ".gltf": damaged_json,
     ".glb": damaged_glb, ".b3dm": damaged_b3dm, ".png": damaged_png, ".tif": damaged_tiff, ".npz": damaged_zip,
     ".pgw": damaged_text, ".points": damaged_text, ".prj": damaged_text, ".usda": damaged_text, ".obj": damaged_text,
-    ".mtl": damaged_text, ".csv": damaged_text,
+    ".mtl": damaged_text, ".csv": damaged_text, ".safetensors": damaged_safetensors,
 }  # fmt: skip
 """What suits a kind of file; any other is damaged as bytes."""
 
