@@ -24,9 +24,9 @@ DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 MAX_BYTES = 1 << 30
 """Largest file, or file beside it, that is read: 3D Tiles' clients give up at a tenth."""
 
-FREE_NUMBERS, NUMBERS_A_BYTE = 1 << 25, 64
+FREE_NUMBERS, NUMBERS_A_BYTE = 1 << 22, 64
 """How many numbers accessors may give: so many, and so many more for each byte of the buffers. Sound files are read
-some ten times over; a hundred thousand accessors of the same bytes would take hours."""
+some ten times over; a hundred thousand accessors of the same bytes would take hours. What nodes show counts as well."""
 
 MAX_SCENE_VERTICES = 20_000_000
 """Of all instances of all meshes: nodes may show one mesh a million times."""
@@ -199,17 +199,21 @@ class Gltf:
         count = 0
         for mesh, matrix in self.instances():
             for primitive in range(len(self.items("meshes")[mesh]["primitives"])):
-                clouds.append(_moved(self.mesh_arrays(mesh, primitive)[0], matrix))
-                count = _counted(count, len(clouds[-1]))
+                vertices = self.mesh_arrays(mesh, primitive)[0]
+                count = _counted(count, len(vertices))
+                self._charge(vertices.size)
+                clouds.append(_moved(vertices, matrix))
         return np.concatenate(clouds)
 
     def scene_solids(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
         """Positions and triangles of each mesh of the default scene where it stands there, its seams undone."""
         solids = []
         count = 0
+        known: dict[int, tuple[NDArray[Any], NDArray[Any]]] = {}
         for mesh, matrix in self.instances():
-            vertices, faces = self.solid_arrays(mesh)
+            vertices, faces = known[mesh] = known[mesh] if mesh in known else self.solid_arrays(mesh)
             count = _counted(count, max(len(vertices), len(faces)))
+            self._charge(vertices.size + faces.size)
             mirrored = np.linalg.det(matrix[:3, :3]) < 0
             solids.append((_moved(vertices, matrix), faces[:, ::-1] if mirrored else faces))
         return solids

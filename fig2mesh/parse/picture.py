@@ -15,6 +15,8 @@ from fig2mesh.errors import FigureError
 from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, size_of
 from fig2mesh.records import PART_NAMES, BoolArray, ByteArray
 
+OPAQUE = np.array([0, 0, 0, 255], np.uint8)
+
 BAND_PX = 512
 """Rows that are converted to RGBA at a time."""
 
@@ -91,27 +93,39 @@ def _open(path: Path, what: str) -> Image.Image:
 def read_rgba(path: Path) -> ByteArray:
     """(H, W, 4) uint8 of a picture of any mode, upright. Raises FigureError."""
     image = _open(path, "figure")
+    try:
+        return _rgba(image)
+    except (ValueError, OSError) as error:  # a pixel that names no colour of its palette
+        raise FigureError(path, f"cannot be read ({error})", "give an intact picture as figure") from None
+
+
+def _rgba(image: Image.Image) -> ByteArray:
     # In bands, as Pillow would keep two more copies of the whole picture meanwhile, and NumPy more of a deep grey one.
     width, height = image.size
     bands = [(top, min(top + BAND_PX, height)) for top in range(0, height, BAND_PX)]
     # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
     deep = image.mode.startswith(("I", "F"))
     most = max((float(_grey(image, band).max()) for band in bands), default=0.0) if deep else 0.0
+    factor = 255.0 / (65535.0 if most > 255 else 255.0)
+    steps = np.clip(np.arange(65536) * factor, 0, 255).astype(np.uint8)
     rgba = np.empty((height, width, 4), np.uint8)
     for top, bottom in bands:
         if deep:
-            values = _grey(image, (top, bottom)) / (65535.0 if most > 255 else 255.0) * 255.0
-            rgba[top:bottom] = np.clip(values, 0, 255).astype(np.uint8)[..., None]
-            rgba[top:bottom, :, 3] = 255
+            values = _grey(image, (top, bottom))
+            short = values.dtype.itemsize == 2
+            grey = steps[values] if short else np.clip(values * factor, 0, 255).astype(np.uint8)
+            rgba[top:bottom] = grey[..., None] | OPAQUE
         else:
             rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
     return rgba
 
 
-def _grey(image: Image.Image, band: tuple[int, int]) -> NDArray[np.float64]:
+def _grey(image: Image.Image, band: tuple[int, int]) -> NDArray[np.uint16 | np.float64]:
     """Rows of a picture of one deep channel; where a float one holds no number, 0."""
-    values = np.asarray(image.crop((0, band[0], image.width, band[1])), np.float64)
-    return np.nan_to_num(values, nan=0.0)
+    rows = np.asarray(image.crop((0, band[0], image.width, band[1])))
+    if rows.dtype.itemsize == 2:
+        return rows.astype(np.uint16)
+    return np.nan_to_num(rows.astype(np.float64), nan=0.0)
 
 
 def read_mask(path: Path | None, view: View) -> BoolArray | None:
@@ -138,7 +152,7 @@ def read_mask(path: Path | None, view: View) -> BoolArray | None:
 
 def _of_view(path: Path, view: View) -> ByteArray | None:
     """The view's part of a picture beside the figure's; None where that picture is not as large as the figure's."""
-    if is_large(path):
+    if is_large(path) and view.rgba.shape[:2] != view.size[::-1]:
         (x, y), (height, width) = view.corner, view.rgba.shape[:2]
         whole = size_of(path) == view.size
         return read_window(path, (x, y, x + width, y + height))[0] if whole else None

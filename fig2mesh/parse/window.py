@@ -107,6 +107,8 @@ def _libvips() -> Any:
     # What libvips has to say of a file is in its errors as well.
     logging.getLogger("pyvips").setLevel(logging.ERROR)
     pyvips.block_untrusted_set(True)
+    # Its cache knows files by their names: one that is written anew would be seen as it was.
+    pyvips.cache_set_max(0)
     return pyvips
 
 
