@@ -22,7 +22,7 @@ from exporters.findings import Finding
 from exporters.georeference import placement_of_record
 from exporters.glb_container import open_glb
 from georef.geodesy import ecef_from_geodetic
-from georef.json_file import read_json
+from georef.json_file import is_there, read_json
 from georef.placement import GeoPlacement
 
 GEOMETRIES = {
@@ -118,7 +118,7 @@ def _placement(uri: str, path: Path, where: str) -> tuple[GeoPlacement | None, l
     if uri.startswith(("http:", "https:", "data:", "//")):
         return None, [Finding("info", "NOT_CHECKED", f"model {uri[:60]} is elsewhere", where)]
     file = path.parent / unquote(uri)
-    if not file.is_file():
+    if not is_there(file):
         return None, [Finding("error", "REFERENCE", f"model {uri!r} is not there", where)]
     if file.suffix.lower() != ".glb":
         return None, []

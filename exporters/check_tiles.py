@@ -23,7 +23,7 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, Severity
 from exporters.georeference import placement_of_record
 from georef.geodesy import ecef_from_tile
-from georef.json_file import read_json
+from georef.json_file import is_there, read_json
 
 INSIDE_TOLERANCE_M = 1e-6
 """Vertices this far outside a volume pass: float64 ECEF coordinates are good to 1e-9 m, boxes may be shared."""
@@ -182,9 +182,9 @@ class _Walk:
             yield Finding("info", "NOT_CHECKED", f"content {uri[:60]} is elsewhere", where)
             return
         file = self.path.parent / unquote(uri)
-        if not file.is_file():
+        if not is_there(file):
             file = self.path.parent / unquote(uri.partition("?")[0].partition("#")[0])
-        if not uri or not file.is_file():
+        if not uri or not is_there(file):
             yield Finding("error", "CONTENT", f"content {uri!r} is not there", where)
             return
         self.looks[file.resolve()] += 1

@@ -17,9 +17,9 @@ from exporters.facts import file_sizes, solid_facts
 from exporters.georeference import placement_of_tile
 from exporters.gltf_reader import Gltf, read_gltf
 from exporters.inspect_places import collection_facts, places_facts
-from exporters.inspect_usd import usd_facts
 from exporters.solid import merged_by_position
 from exporters.texture_files import texture_size
+from exporters.usd_process import usd_facts_apart
 from exporters.validate import read_triangles
 
 
@@ -61,7 +61,7 @@ def _inspect_any(path: Path) -> dict[str, Any]:
     if suffix in (".glb", ".gltf"):
         return _inspect_gltf(path)
     if suffix in (".usda", ".usdc", ".usdz"):
-        return usd_facts(path)
+        return usd_facts_apart(path)
     if suffix in (".ply", ".obj"):
         return _inspect_triangles(path)
     raise ExportError(path, f"cannot inspect suffix {suffix or 'none'}", "see exporters.write.FORMATS")

@@ -8,7 +8,7 @@ from urllib.parse import unquote
 
 from exporters.check_tiles import read_tileset
 from exporters.errors import ExportError
-from georef.json_file import read_json
+from georef.json_file import is_there, read_json
 
 FORMATS = {".czml": "CZML", ".geojson": "GeoJSON"}
 
@@ -35,7 +35,7 @@ def places_facts(path: Path, gltf_facts: Any) -> dict[str, Any]:
     """
     count, models = models_of(path)
     own = {"format": FORMATS[path.suffix.lower()], "files": {path.name: path.stat().st_size}}
-    if count != 1 or not models or not models[0].is_file():
+    if count != 1 or not models or not is_there(models[0]):
         return own | {"metadata": {"figures": count}}
     facts: dict[str, Any] = gltf_facts(models[0])
     return facts | own | {"files": own["files"] | facts["files"]}

@@ -5,12 +5,13 @@ http://paulbourke.net/dataformats/obj/ and http://paulbourke.net/dataformats/mtl
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from exporters.errors import ExportError
 from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
-from georef.json_file import read_bytes
+from georef.json_file import is_there, read_bytes
 
 MAX_TRIANGLE_BYTES = 256 << 20
 """Largest PLY or OBJ that is read: some 10 million triangles; trimesh needs about ten times as much memory."""
@@ -33,7 +34,7 @@ def references_of(path: Path) -> list[Reference]:
     Raises ExportError for more than `MAX_REFERENCES`, and for a file that cannot be read.
     """
     libraries = list(_named(path, "mtllib", MAX_TRIANGLE_BYTES))
-    there = [library for *_, library in libraries if library.is_file()]
+    there = [library for *_, library in libraries if is_there(library)]
     found = libraries + [texture for each in there for texture in _named(each, "map_Kd", MAX_LIBRARY_BYTES)]
     if len(found) > MAX_REFERENCES:
         raise ExportError(path, f"names {len(found)} files", f"give a model with at most {MAX_REFERENCES}")
@@ -54,7 +55,7 @@ def check_triangle_file(path: Path) -> None:
     if path.suffix.lower() != ".obj":
         return
     for file, word, name, target in references_of(path):
-        if not target.exists():
+        if not os.path.exists(target):
             continue  # for `exporters.validate` to say
         limit = MAX_LIBRARY_BYTES if word == "mtllib" else MAX_TEXTURE_BYTES
         try:

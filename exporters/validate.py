@@ -11,11 +11,12 @@ import numpy as np
 from exporters.check_gltf import check_gltf
 from exporters.check_places import check_czml, check_geojson
 from exporters.check_tiles import check_tileset
-from exporters.check_usd import check_usd
 from exporters.errors import DAMAGE, ExportError
 from exporters.findings import Finding, check_solid
 from exporters.solid import merged_by_position
 from exporters.triangle_files import check_triangle_file, references_of
+from exporters.usd_process import check_usd_apart
+from georef.json_file import is_there
 
 __all__ = ["Finding", "read_triangles", "validate"]
 
@@ -49,7 +50,7 @@ def _check_any(path: Path, external: bool) -> list[Finding]:
     if suffix in (".glb", ".gltf"):
         return check_gltf(path, external)
     if suffix in (".usda", ".usdc", ".usdz"):
-        return check_usd(path)
+        return check_usd_apart(path)
     if suffix in (".ply", ".obj"):
         return _check_triangles(path)
     if suffix == ".czml":
@@ -92,5 +93,5 @@ def _check_references(path: Path) -> list[Finding]:
     return [
         Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
         for file, word, name, target in references_of(path)
-        if not target.is_file()
+        if not is_there(target)
     ]

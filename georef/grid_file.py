@@ -92,8 +92,10 @@ def _directory(stream: BinaryIO, place: int, order: str, big: bool, size: int) -
     for _ in range(count):
         tag, kind, number = _unpacked(stream, order + entry_kind)
         value = stream.read(word)
+        if len(value) < word:
+            raise ValueError("the file is cut off")
         length = _SIZES.get(kind, 1) * number
-        offset = struct.unpack(order + ("Q" if big else "I"), value)[0] if len(value) == word else size
+        offset = struct.unpack(order + ("Q" if big else "I"), value)[0]
         if length > word and offset + length > size:
             raise ValueError(f"tag {tag} ends at byte {offset + length} of {size}")
         if tag in entries:

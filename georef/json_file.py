@@ -74,6 +74,14 @@ def read_json(path: Path, remedy: str, error: type[InputError] = InputError, max
         raise error(path, str(problem), remedy) from None
 
 
+def is_there(path: Path) -> bool:
+    """Whether a path is a plain file. A name out of a file may be longer than any, or hold what no name can."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def read_bytes(path: Path, max_bytes: int) -> bytes:
     """The bytes of a plain file of limited size.
 

@@ -19,7 +19,7 @@ from exporters.georeference import placement_of_record
 from exporters.gltf_reader import Gltf, read_gltf
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
-from georef.json_file import read_json
+from georef.json_file import is_there, read_json
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
@@ -204,5 +204,5 @@ def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
 
 
 def _check_there(target: Path, by: Path) -> None:
-    if not target.is_file():
+    if not is_there(target):
         raise InputError(by, f"needs {target.name}, which is not there", "write it again, whole")

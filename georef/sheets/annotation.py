@@ -18,6 +18,9 @@ from georef.sheets.controls import MAX_POINTS, Controls, make_controls, read_tex
 
 GEOREFERENCING = "georeferencing"
 
+MAX_HEAD = 2000
+"""Characters of an SVG selector in which the size of the resource is looked for."""
+
 METHODS = {
     "helmert": "helmert",
     "projective": "projective",
@@ -135,7 +138,8 @@ def _size(target: Any) -> tuple[float, float] | None:
             if len(sides) == 2:
                 return float(sides[0]), float(sides[1])
     selector = target.get("selector")
-    drawing = str(selector.get("value")) if isinstance(selector, dict) else ""
+    # Of a drawing only its head is looked at: XML is not parsed, and a search through all of it would not end.
+    drawing = str(selector.get("value"))[:MAX_HEAD] if isinstance(selector, dict) else ""
     found = [re.search(rf'<svg[^>]*\b{name}="(\d+(?:\.\d+)?)"', drawing) for name in ("width", "height")]
     numbers = [float(match[1]) for match in found if match is not None]
     return (numbers[0], numbers[1]) if len(numbers) == 2 and min(numbers) > 0 else None

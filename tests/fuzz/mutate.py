@@ -355,4 +355,7 @@ def mutated(files: dict[str, bytes], main: str, rng: random.Random) -> dict[str,
     name = rng.choice(others) if others and rng.random() < 0.25 else main
     suffix = "." + name.rsplit(".", 1)[-1].lower()
     change = BY_SUFFIX.get(suffix, damaged_bytes)
-    return files | {name: change(files[name], rng)}
+    try:
+        return files | {name: change(files[name], rng)}
+    except RecursionError:  # nested deeper than can be written
+        return files | {name: damaged_bytes(files[name], rng)}

@@ -25,7 +25,7 @@ class Reader:
 
     seeds : makes the intact inputs that damage starts from; the reader has to accept each
     read : reads the main file of an input; may raise InputError and nothing else
-    weight : its share of the inputs, 1 is usual
+    weight : its share of the inputs; what is quick gets more of them
     memory_mb : what reading a small file may add to the address space of a process that has read intact ones
     """
 
@@ -144,7 +144,7 @@ def read_stage(path: Path) -> None:
 
     beside = path.with_name("stage")
     stage = beside.read_bytes().decode("ascii", "ignore") if beside.is_file() else "lift"
-    stage = stage if stage.isalpha() else "lift"
+    stage = stage if stage.isalpha() and len(stage) < 40 else "lift"
     shutil.copyfile(path, path.with_name(f"{stage}.npz"))
     load_stage(path.parent, stage)
 
@@ -177,25 +177,25 @@ def globe_inputs() -> Iterator[Input]:
 
 
 READERS: dict[str, Reader] = {
-    "joints": Reader(seeds.joints, read_joints, 2),
+    "joints": Reader(seeds.joints, read_joints, 6),
     "picture": Reader(seeds.pictures, read_picture, 2, 2560),
-    "window": Reader(seeds.scans, read_scan, 1, 2048),
-    "world-file": Reader(seeds.world_files, read_map),
-    "points": Reader(seeds.points_files, read_map),
-    "annotation": Reader(seeds.annotations, read_map),
-    "geotiff": Reader(seeds.geotiffs, read_map),
-    "heights": Reader(seeds.height_grids, read_heights),
-    "glb": Reader(seeds.glbs, read_glb),
-    "gltf": Reader(seeds.gltfs, look_and_check),
-    "b3dm": Reader(seeds.b3dms, read_batched),
-    "tileset": Reader(seeds.tilesets, read_tiles),
-    "entities": Reader(seeds.entities, look_and_check),
-    "usd": Reader(seeds.stages, look_and_check, 0.2),
-    "triangles": Reader(seeds.triangle_files, look_and_check),
-    "model": Reader(seeds.models, read_drawn_model),
-    "stage": Reader(seeds.stage_files, read_stage),
-    "weights": Reader(seeds.weights, read_weights),
-    "globe": Reader(globe_inputs, read_for_globe),
+    "window": Reader(seeds.scans, read_scan, 3, 2048),
+    "world-file": Reader(seeds.world_files, read_map, 0.3),
+    "points": Reader(seeds.points_files, read_map, 2),
+    "annotation": Reader(seeds.annotations, read_map, 2),
+    "geotiff": Reader(seeds.geotiffs, read_map, 3),
+    "heights": Reader(seeds.height_grids, read_heights, 5),
+    "glb": Reader(seeds.glbs, read_glb, 2),
+    "gltf": Reader(seeds.gltfs, look_and_check, 0.5),
+    "b3dm": Reader(seeds.b3dms, read_batched, 1.5),
+    "tileset": Reader(seeds.tilesets, read_tiles, 0.5),
+    "entities": Reader(seeds.entities, look_and_check, 3),
+    "usd": Reader(seeds.stages, look_and_check, 0.1),
+    "triangles": Reader(seeds.triangle_files, look_and_check, 1),
+    "model": Reader(seeds.models, read_drawn_model, 1),
+    "stage": Reader(seeds.stage_files, read_stage, 3),
+    "weights": Reader(seeds.weights, read_weights, 3),
+    "globe": Reader(globe_inputs, read_for_globe, 2),
 }
 
 

@@ -23,6 +23,8 @@ from tests.georef.sheets import sheets
 
 PLACE = GeoPlacement(8.5417, 47.3769, 455.34, "egm96", 135.0)
 STEM = "main"
+BESIDE = ".glb .bin .mtl .prj .png "
+"""Suffixes of files that others name, those that may be main ones first."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,9 @@ class Input:
 def taken(folder: Path) -> Input:
     """The input that lies in a folder."""
     files = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    (main,) = (name for name in files if name.startswith(f"{STEM}."))
-    return Input(main, files)
+    mains = [name for name in files if name.startswith(f"{STEM}.")]
+    # Of several, the one that names the others.
+    return Input(min(mains, key=lambda name: (BESIDE.find(Path(name).suffix + " "), name)), files)
 
 
 def alone(suffix: str, data: bytes) -> Input:

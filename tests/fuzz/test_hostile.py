@@ -31,6 +31,9 @@ from fig2mesh.render.model import read_model
 from fig2mesh.stages import load_stage, save_stage
 from georef.errors import PlacementError
 from georef.heights import undulation_m
+from georef.mapsheet import read_sheet
+from georef.sheets.reference import crs_of
+from tests.fuzz import seeds
 from tests.fuzz.readers import READERS
 from tests.fuzz.worker import outcome
 
@@ -161,6 +164,7 @@ def test_a_mesh_that_is_shown_a_million_times(tmp_path: Path) -> None:
 
 def test_textures_of_more_pixels_than_are_decoded(tmp_path: Path) -> None:
     image = png(9000, 9000, b"")
+    image += bytes(-len(image) % 4)
     document = {
         "images": [{"bufferView": 0, "mimeType": "image/png"}],
         "bufferViews": [{"buffer": 0, "byteLength": len(image)}],
@@ -330,6 +334,29 @@ def test_names_that_are_no_unicode_are_one_line_on_the_terminal(tmp_path: Path) 
     assert run.returncode == 2, run.stderr
     assert run.stderr.count(b"\n") == 1
     assert b"\x1b" not in run.stderr
+
+
+@pytest.mark.parametrize(
+    "text", ["{" * 9000, '{"a":' * 9000 + "1" + "}" * 9000, "[{" * 9000, "PROJCS[" * 9000, "EPSG:2056+" * 20_000]
+)
+def test_reference_systems_that_are_nested_or_endless(text: str) -> None:
+    with pytest.raises(PlacementError, match="is no reference system"):
+        crs_of(text)
+
+
+def test_a_drawing_in_an_annotation_is_not_searched_through(tmp_path: Path) -> None:
+    case = next(seeds.annotations())
+    document = json.loads(case.files[case.main])
+    document["target"] = {"selector": {"value": "<svg" * 1_500_000}}
+    (tmp_path / "main.json").write_text(json.dumps(document))
+    assert read_sheet(tmp_path / "main.json").size is None
+
+
+def test_a_cell_of_a_points_file_that_never_ends(tmp_path: Path) -> None:
+    case = next(seeds.points_files())
+    (tmp_path / "main.points").write_bytes(case.files[case.main] + b'1,2,3,"' + b"x" * 200_000)
+    with pytest.raises(PlacementError, match="field larger than field limit"):
+        read_sheet(tmp_path / "main.points")
 
 
 def test_links_that_lead_in_a_circle(tmp_path: Path) -> None:
