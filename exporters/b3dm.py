@@ -20,6 +20,7 @@ import numpy as np
 from exporters.errors import ExportError
 from exporters.glb_container import glb_of
 from exporters.gltf_reader import Gltf
+from georef.json_file import parse_json
 
 HEADER = struct.Struct("<4sIIIIII")
 """magic, version, bytes in all, of the feature table's JSON and binary, of the batch table's JSON and binary."""
@@ -195,6 +196,8 @@ def read_b3dm(data: bytes) -> B3dm:
     ends = [HEADER.size + end for end in itertools.accumulate(lengths)]
     if total % 8 or ends[1] % 8 or ends[3] % 8:
         raise ValueError(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
-    feature_table = json.loads(data[HEADER.size : ends[0]])
-    batch_table = json.loads(data[ends[1] : ends[2]]) if lengths[2] else {}
+    feature_table = parse_json(data[HEADER.size : ends[0]])
+    batch_table = parse_json(data[ends[1] : ends[2]]) if lengths[2] else {}
+    if not isinstance(feature_table, dict) or not isinstance(batch_table, dict):
+        raise ValueError("a table is no JSON object")
     return B3dm(feature_table, batch_table, data[ends[3] :])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +14,9 @@ from exporters.b3dm import B3dm, read_b3dm
 from exporters.check_gltf import check_gltf
 from exporters.errors import ExportError
 from exporters.findings import Finding
-from exporters.gltf_reader import read_gltf
+from exporters.gltf_reader import MAX_BYTES, read_gltf
 from georef.geodesy import tile_from_asset
+from georef.json_file import read_bytes
 
 UNCHECKED = {
     b"pnts": "a point cloud",
@@ -83,8 +83,8 @@ def _mesh(file: Path, findings: tuple[Finding, ...], up_axis: str) -> Content:
 
 def _b3dm(file: Path, external: bool, up_axis: str) -> Content:
     try:
-        tile = read_b3dm(file.read_bytes())
-    except (ValueError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        tile = read_b3dm(read_bytes(file, MAX_BYTES))
+    except (OSError, ValueError) as error:
         return Content("mesh", (Finding("error", "B3DM", str(error), file.name),))
     with tempfile.TemporaryDirectory(prefix="fig2mesh-") as folder:
         inner = Path(folder) / f"{file.name}.glb"

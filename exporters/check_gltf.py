@@ -8,18 +8,18 @@ https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from exporters.check_khronos import khronos_findings
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.findings import Finding, as_infos, check_place, check_solid
 from exporters.gltf_reader import MESHOPT, Gltf, NotReadHere, read_gltf
 from exporters.ktx2 import size_of
+from exporters.texture_files import MAX_TEXTURE_PX, TooLarge, check_texture
 
 UNIT_TOLERANCE = 5e-4
 """How far a normal's length may be from 1; the Khronos validator allows about as much."""
@@ -29,6 +29,9 @@ BYTE_UNIT_TOLERANCE = 2e-2
 
 NOT_HERE = "NOT_READ_HERE"
 """Code of the infos about what is not decoded here."""
+
+MAX_TEXTURES = 4
+"""Textures of the largest size whose pixels one file may have decoded: images may name the same bytes."""
 
 CODECS = {
     *MESHOPT, "KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_basisu", "KHR_texture_transform",
@@ -58,7 +61,7 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
             findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
         except NotReadHere as reason:
             findings.append(Finding("info", NOT_HERE, str(reason), where))
-        except (ValueError, LookupError, TypeError) as error:
+        except DAMAGE as error:
             findings.append(Finding("error", "UNREADABLE_MESH", str(error), where))
     if not external:
         return findings
@@ -85,8 +88,12 @@ def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
         yield from check_place(place, f"{name}: asset.extras.georeference")
     for index in range(len(gltf.items("accessors"))):
         yield from _check_accessor(gltf, index, f"{name}: accessors/{index}")
+    pixels = 0
     for index in range(len(gltf.items("images"))):
-        yield from _check_image(gltf, index, f"{name}: images/{index}")
+        if pixels > MAX_TEXTURES * MAX_TEXTURE_PX:
+            yield Finding("info", NOT_HERE, f"images/{index} and all after it: more pixels than are looked into", name)
+            break
+        pixels += yield from _check_image(gltf, index, f"{name}: images/{index}")
     yield from _check_property_tables(gltf)
     yield from _check_property_textures(gltf)
 
@@ -98,7 +105,7 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
     except NotReadHere as reason:
         yield Finding("info", NOT_HERE, str(reason), where)
         return
-    except (ValueError, LookupError, TypeError) as error:
+    except DAMAGE as error:
         yield Finding("error", "ACCESSOR", str(error), where)
         return
     if values.dtype.kind == "f" and not np.isfinite(values).all():
@@ -111,20 +118,19 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
             yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, values say {measured.tolist()}", where)
 
 
-def _check_image(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
-    from PIL import Image
-
+def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None, int]:
+    """Findings about an image; returns how many pixels had to be decoded."""
     try:
         data = gltf.image(index)
         if gltf.items("images")[index].get("mimeType") == "image/ktx2":
             size_of(data)
-            return
-        with Image.open(io.BytesIO(data)) as image:
-            image.load()
-    except NotReadHere as reason:
+            return 0
+        return check_texture(data)
+    except (NotReadHere, TooLarge) as reason:
         yield Finding("info", NOT_HERE, str(reason), where)
-    except (ValueError, LookupError, OSError) as error:
+    except DAMAGE as error:
         yield Finding("error", "IMAGE", str(error), where)
+    return 0
 
 
 def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bool) -> Iterator[Finding]:

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from exporters.errors import ExportError
 from exporters.findings import Finding
+from georef.json_file import read_json
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
@@ -26,9 +28,9 @@ def read_schema(document: dict[str, Any], path: Path) -> tuple[dict[str, Any] | 
         if "://" in uri:
             return None, [Finding("info", "NOT_CHECKED", f"the schema {uri} is elsewhere", name)]
         try:
-            schema = json.loads((path.parent / unquote(uri)).read_bytes())
-        except (OSError, ValueError) as error:
-            return None, [Finding("error", "SCHEMA", f"{uri} cannot be read ({error})", name)]
+            schema = read_json(path.parent / unquote(uri), "write it again", ExportError)
+        except ExportError as error:
+            return None, [Finding("error", "SCHEMA", f"{uri} cannot be read ({error.finding})", name)]
     if schema is None:
         return None, []
     if not isinstance(schema, dict) or not isinstance(schema.get("classes", {}), dict):

@@ -6,7 +6,6 @@ https://github.com/AnalyticalGraphicsInc/czml-writer/wiki/CZML-Structure
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +22,7 @@ from exporters.findings import Finding
 from exporters.georeference import placement_of_record
 from exporters.glb_container import open_glb
 from georef.geodesy import ecef_from_geodetic
+from georef.json_file import is_there, read_json
 from georef.placement import GeoPlacement
 
 GEOMETRIES = {
@@ -37,10 +37,7 @@ HEIGHT_REFERENCES = {
 
 
 def _document(path: Path) -> Any:
-    try:
-        return json.loads(path.read_bytes())
-    except (OSError, ValueError) as error:
-        raise ExportError(path, f"no readable JSON ({error})", "write it again") from error
+    return read_json(path, "write it again", ExportError)
 
 
 def check_geojson(path: Path) -> list[Finding]:
@@ -121,7 +118,7 @@ def _placement(uri: str, path: Path, where: str) -> tuple[GeoPlacement | None, l
     if uri.startswith(("http:", "https:", "data:", "//")):
         return None, [Finding("info", "NOT_CHECKED", f"model {uri[:60]} is elsewhere", where)]
     file = path.parent / unquote(uri)
-    if not file.is_file():
+    if not is_there(file):
         return None, [Finding("error", "REFERENCE", f"model {uri!r} is not there", where)]
     if file.suffix.lower() != ".glb":
         return None, []

@@ -6,8 +6,8 @@ https://docs.ogc.org/cs/22-025r4/22-025r4.html
 
 from __future__ import annotations
 
-import json
 import math
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, Severity
 from exporters.georeference import placement_of_record
 from georef.geodesy import ecef_from_tile
+from georef.json_file import is_there, read_json
 
 INSIDE_TOLERANCE_M = 1e-6
 """Vertices this far outside a volume pass: float64 ECEF coordinates are good to 1e-9 m, boxes may be shared."""
@@ -33,6 +34,9 @@ CHILD_TOLERANCE_M = 1e-3
 PLACE_TOLERANCE_M, TURN_TOLERANCE_DEG = 1e-3, 0.01
 """What we promise of the feet and the nose."""
 
+MAX_SAME_FILE = 20
+"""How often one file is looked into: tilesets may name it a million times, and each other twice, without end."""
+
 SINCE_1_1 = ("schema", "schemaUri", "metadata", "groups", "contents", "implicitTiling")
 
 
@@ -42,18 +46,15 @@ def check_tileset(path: Path, external: bool = True) -> list[Finding]:
     path : the tileset.json or its folder; external : as for `check_gltf`
     """
     path = path / "tileset.json" if path.is_dir() else path
-    return list(_check_file(path, external, _Above(np.eye(4), (), math.inf, False), frozenset()))
+    return list(_check_file(path, external, _Above(np.eye(4), (), math.inf, False), frozenset(), Counter()))
 
 
 def read_tileset(path: Path) -> dict[str, Any]:
     """The document of a tileset. Raises ExportError for a file that is not there or no tileset."""
-    try:
-        document = json.loads(path.read_bytes())
-        if not isinstance(document, dict) or not isinstance(document.get("root"), dict):
-            raise ValueError("no root tile")
-        return document
-    except (OSError, ValueError) as error:
-        raise ExportError(path, f"no readable tileset ({error})", "write it again") from error
+    document = read_json(path, "give a tileset.json of 3D Tiles", ExportError)
+    if not isinstance(document, dict) or not isinstance(document.get("root"), dict):
+        raise ExportError(path, "no root tile", "give a tileset.json of 3D Tiles")
+    return document
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,9 @@ class _Above:
     placed: bool
 
 
-def _check_file(path: Path, external: bool, above: _Above, chain: frozenset[Path]) -> Iterator[Finding]:
+def _check_file(
+    path: Path, external: bool, above: _Above, chain: frozenset[Path], looks: Counter[Path]
+) -> Iterator[Finding]:
     name = path.name
     if path.resolve() in chain:
         yield Finding("error", "CYCLE", "the tileset contains itself", name)
@@ -96,18 +99,19 @@ def _check_file(path: Path, external: bool, above: _Above, chain: frozenset[Path
         yield from check_entity(group, schema, f"{name}: groups/{index}")
     ours = asset.get("generator") == "fig2mesh"
     up_axis = str(asset.get("gltfUpAxis", "Y")).upper()
-    walk = _Walk(path, external, chain | {path.resolve()}, schema, version == "1.0", ours, up_axis)
+    walk = _Walk(path, external, chain | {path.resolve()}, looks, schema, version == "1.0", ours, up_axis)
     yield from walk.too_new(document, name)
     yield from walk.tile(document["root"], replace(above, error=min(error, above.error)), f"{name}: root")
 
 
 @dataclass(frozen=True)
 class _Walk:
-    """One tileset file: where it is, what its tiles are checked against."""
+    """One tileset file: where it is, how often each file was looked into, what its tiles are checked against."""
 
     path: Path
     external: bool
     chain: frozenset[Path]
+    looks: Counter[Path]
     schema: dict[str, Any] | None
     old: bool
     ours: bool
@@ -178,14 +182,20 @@ class _Walk:
             yield Finding("info", "NOT_CHECKED", f"content {uri[:60]} is elsewhere", where)
             return
         file = self.path.parent / unquote(uri)
-        if not file.is_file():
+        if not is_there(file):
             file = self.path.parent / unquote(uri.partition("?")[0].partition("#")[0])
-        if not uri or not file.is_file():
+        if not uri or not is_there(file):
             yield Finding("error", "CONTENT", f"content {uri!r} is not there", where)
+            return
+        self.looks[file.resolve()] += 1
+        if (count := self.looks[file.resolve()]) > MAX_SAME_FILE:
+            if count == MAX_SAME_FILE + 1:
+                message = f"{uri}: named more than {MAX_SAME_FILE} times, the others are not looked into"
+                yield Finding("info", "NOT_CHECKED", message, where)
             return
         content = read_content(file, self.external, self.up_axis)
         if content.kind == "tileset":
-            yield from _check_file(file, self.external, here, self.chain)
+            yield from _check_file(file, self.external, here, self.chain, self.looks)
             return
         yield from content.findings
         if self.old and file.suffix.lower() in (".glb", ".gltf"):

@@ -40,6 +40,11 @@ def open_stage(path: Path) -> Any:
     return stage
 
 
+def reason_of(error: Exception) -> str:
+    """What USD has to say of damage, without the place in its own source."""
+    return "USD cannot read it (" + " ".join(str(error).rpartition(" : '")[2].split())[:100].rstrip("'") + ")"
+
+
 def is_ours(stage: Any) -> bool:
     """Whether the root layer says that fig2mesh wrote it."""
     return bool(stage.GetRootLayer().customLayerData.get("generator") == "fig2mesh")
@@ -73,8 +78,18 @@ def check_usd(path: Path) -> list[Finding]:
         stage = open_stage(path)
     except ExportError as error:
         return [Finding("error", "UNREADABLE", error.finding, path.name), *findings]
+    from pxr import Tf
+
+    try:
+        return findings + _check_stage(stage, path)
+    except Tf.ErrorException as error:  # binary layers are unpacked as they are asked for
+        return [Finding("error", "UNREADABLE", reason_of(error), path.name), *findings]
+
+
+def _check_stage(stage: Any, path: Path) -> list[Finding]:
     from pxr import UsdGeom
 
+    findings: list[Finding] = []
     ours = is_ours(stage)
     if UsdGeom.GetStageMetersPerUnit(stage) != 1.0 or UsdGeom.GetStageUpAxis(stage) != UsdGeom.Tokens.y:
         found = f"{UsdGeom.GetStageMetersPerUnit(stage):g} m a unit, {UsdGeom.GetStageUpAxis(stage)} up"

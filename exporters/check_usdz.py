@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 import zipfile
+import zlib
 from pathlib import Path, PurePosixPath
 
 from exporters.findings import Finding
@@ -21,8 +22,10 @@ def check_usdz(path: Path) -> list[Finding]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-            broken = archive.testzip()
-    except (zipfile.BadZipFile, OSError) as error:
+            # Packages hold everything as it is: what unpacks to more than the file is not unpacked.
+            plain = sum(member.file_size for member in members) <= path.stat().st_size
+            broken = archive.testzip() if plain else None
+    except (zipfile.BadZipFile, OSError, NotImplementedError, ValueError, zlib.error) as error:
         return [Finding("error", "UNREADABLE", f"no readable archive ({error})", path.name)]
     findings = []
 
@@ -39,11 +42,18 @@ def check_usdz(path: Path) -> list[Finding]:
                 note(member.filename, "is compressed")
             if member.flag_bits & 1:
                 note(member.filename, "is encrypted")
+            place = PurePosixPath(member.filename)
+            if place.is_absolute() or ".." in place.parts:
+                note(member.filename, "leads out of the package")
             if PurePosixPath(member.filename).suffix.lower() not in ALLOWED:
                 note(member.filename, "is of a type that packages may not hold")
             # The local header, not the directory's, says where the data begins.
             stream.seek(member.header_offset + 26)
-            name, extra = struct.unpack("<2H", stream.read(4))
+            head = stream.read(4)
+            if len(head) < 4:
+                note(member.filename, "begins beyond the end of the file")
+                continue
+            name, extra = struct.unpack("<2H", head)
             start = member.header_offset + 30 + name + extra
             if start % ALIGNMENT:
                 note(member.filename, f"begins at byte {start}, no multiple of {ALIGNMENT}")

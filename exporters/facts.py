@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from exporters.ktx2 import IDENTIFIER, size_of
 from exporters.solid import measure_topology
+from georef.json_file import is_there
 
 
 def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
@@ -32,14 +31,4 @@ def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
 
 def file_sizes(*paths: Path) -> dict[str, int]:
     """Bytes of the files that are there, by name."""
-    return {path.name: path.stat().st_size for path in paths if path.is_file()}
-
-
-def texture_size(data: bytes) -> list[int]:
-    """Width and height of an image file."""
-    from PIL import Image
-
-    if data.startswith(IDENTIFIER):
-        return list(size_of(data))
-    with Image.open(io.BytesIO(data)) as image:
-        return [image.width, image.height]
+    return {path.name: path.stat().st_size for path in paths if is_there(path)}

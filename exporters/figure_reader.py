@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.b3dm import part_table
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.georeference import placement_of_record
 from exporters.glb_container import open_glb
 from exporters.gltf_reader import Gltf
 from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
+from georef.errors import InputError
 from georef.geodesy import tile_from_asset
 
 SAME_PLACE_M = 1e-3
@@ -44,7 +45,7 @@ def read_figures(path: Path) -> Iterator[PlacedFigure]:
         raise ExportError(path, "is not there", "check the name")
     if path.is_dir():
         if (path / "tileset.json").is_file():
-            yield from _tileset(path / "tileset.json", frozenset())
+            yield from _tileset(path / "tileset.json", frozenset(), set())
             return
         for each in sorted(path.iterdir()):
             hidden = each.name.startswith(".")
@@ -54,7 +55,7 @@ def read_figures(path: Path) -> Iterator[PlacedFigure]:
     elif path.suffix.lower() == ".glb":
         yield read_figure(path)
     elif path.suffix.lower() == ".json":
-        yield from _tileset(path, frozenset())
+        yield from _tileset(path, frozenset(), set())
     else:
         raise ExportError(path, "is no figure that a tileset can hold", "give .glb files, tilesets or folders of them")
 
@@ -86,7 +87,7 @@ def read_figure(path: Path) -> PlacedFigure:
             shares=tuple(round(share, 4) for share in shares),
             observed=_observed(gltf, np.array(shares)) if shares else None,
         )
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         if isinstance(error, ExportError):
             raise
         raise ExportError(path, f"broken glTF ({' '.join(str(error).split())[:120]})", "see validate") from error
@@ -127,26 +128,36 @@ def _observed(gltf: Gltf, shares: NDArray[np.float64]) -> float | None:
     return area_mean(values, positions[faces].astype(np.float64))
 
 
-def _tileset(path: Path, chain: frozenset[Path]) -> Iterator[PlacedFigure]:
+def _tileset(path: Path, chain: frozenset[Path], read: set[Path]) -> Iterator[PlacedFigure]:
+    """The figures of a tileset; chain : files it is reached by; read : files whose figures are known, it is added."""
     from exporters.check_tiles import read_tileset
 
     document = read_tileset(path)
     if path.resolve() in chain:
         raise ExportError(path, "contains itself", "see validate")
-    yield from _tiles(document["root"], path, chain | {path.resolve()})
+    if path.resolve() in read:
+        return  # its figures would be the same again; files that each name the next twice would be read without end
+    read.add(path.resolve())
+    try:
+        yield from _tiles(document["root"], path, chain | {path.resolve()}, read)
+    except DAMAGE as error:
+        if isinstance(error, InputError):
+            raise
+        reason = " ".join(str(error).split())[:120]
+        raise ExportError(path, f"broken tileset ({type(error).__name__}: {reason})", "see validate") from error
 
 
-def _tiles(tile: dict[str, Any], path: Path, chain: frozenset[Path]) -> Iterator[PlacedFigure]:
+def _tiles(tile: dict[str, Any], path: Path, chain: frozenset[Path], read: set[Path]) -> Iterator[PlacedFigure]:
     if "transform" in tile:
         yield _figure_of_tiles(tile, path)
         return
     uri = tile.get("content", {}).get("uri", "")
     if uri.lower().endswith(".json"):
-        yield from _tileset(path.parent / unquote(uri), chain)
+        yield from _tileset(path.parent / unquote(uri), chain, read)
     elif uri:
         raise ExportError(path, f"has no place for {uri}", "give the .glb files that were made with --lonlat")
     for child in tile.get("children", []):
-        yield from _tiles(child, path, chain)
+        yield from _tiles(child, path, chain, read)
 
 
 def _figure_of_tiles(tile: dict[str, Any], path: Path) -> PlacedFigure:

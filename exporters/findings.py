@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from exporters.georeference import placement_of_record, placement_of_tile
 from exporters.solid import measure_topology
+from georef.errors import one_line
 from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.transform import column_major
 
@@ -32,6 +33,11 @@ class Finding:
     code: str
     message: str
     where: str
+
+    def __post_init__(self) -> None:
+        # Texts out of the file become part of it.
+        object.__setattr__(self, "message", one_line(self.message))
+        object.__setattr__(self, "where", one_line(self.where))
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.where}: {self.message} [{self.code}]"

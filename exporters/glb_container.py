@@ -5,14 +5,14 @@ https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#glb-file-format-specif
 
 from __future__ import annotations
 
-import json
 import mmap
 import struct
 from pathlib import Path
 from typing import Any, cast
 
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.gltf_reader import Gltf
+from georef.json_file import parse_json
 
 
 def open_glb(path: Path) -> Gltf:
@@ -21,6 +21,8 @@ def open_glb(path: Path) -> Gltf:
     `view` gives memoryviews, valid as long as the record. Raises ExportError for what is no binary glTF.
     """
     try:
+        if not path.is_file():  # a pipe would be waited for
+            raise ValueError("is not there" if not path.exists() else "no plain file")
         with path.open("rb") as stream:
             data = memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
     except (OSError, ValueError) as error:
@@ -36,7 +38,7 @@ def glb_of(data: bytes | memoryview, path: Path) -> Gltf:
         if magic != b"glTF" or version != 2 or length > len(data):
             raise ValueError(f"starts with {bytes(magic)!r} version {version}, {length} of {len(data)} bytes")
         size, kind = struct.unpack_from("<I4s", data, 12)
-        document: dict[str, Any] = json.loads(bytes(data[20 : 20 + size]))
+        document: dict[str, Any] = parse_json(data[20 : 20 + size])
         if kind != b"JSON" or not isinstance(document, dict):
             raise ValueError("the first chunk is no JSON object")
         place = 20 + size
@@ -48,6 +50,6 @@ def glb_of(data: bytes | memoryview, path: Path) -> Gltf:
             buffers = (cast(bytes, data[place + 8 : place + 8 + size]),)
         if any("uri" in item for item in document.get("buffers", [])):
             raise ValueError("keeps its buffers in other files")
-    except (ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
+    except DAMAGE as error:
         raise ExportError(path, f"no readable glTF ({error})", "give a .glb") from error
     return Gltf(document, buffers, path)

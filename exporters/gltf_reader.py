@@ -5,9 +5,8 @@ https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 
 from __future__ import annotations
 
-import json
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -16,11 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters import meshopt
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.solid import merged_by_position
+from georef.json_file import parse_json, read_bytes
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+MAX_BYTES = 1 << 30
+"""Largest file, or file beside it, that is read: 3D Tiles' clients give up at a tenth."""
+
+FREE_NUMBERS, NUMBERS_A_BYTE = 1 << 22, 64
+"""How many numbers accessors may give: so many, and so many more for each byte of the buffers. Sound files are read
+some ten times over; a hundred thousand accessors of the same bytes would take hours. What nodes show counts as well."""
+
+MAX_SCENE_VERTICES = 20_000_000
+"""Of all instances of all meshes: nodes may show one mesh a million times."""
+
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
@@ -35,6 +45,7 @@ class Gltf:
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
     path: Path
+    _given: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
 
     def items(self, kind: str) -> list[dict[str, Any]]:
         """A top-level array of the document, empty if absent."""
@@ -50,6 +61,7 @@ class Gltf:
         for name in MESHOPT:
             if name in view.get("extensions", {}):
                 packed = view["extensions"][name]
+                self._charge(int(packed["count"]) * int(packed["byteStride"]))
                 try:
                     return meshopt.decode(self._span(packed, index), packed)
                 except ExportError as error:
@@ -63,11 +75,23 @@ class Gltf:
             raise ValueError(f"bufferView {index} ends at byte {begin + length} of {len(data)}")
         return data[begin : begin + length]
 
+    def _charge(self, numbers: int) -> None:
+        """Count what is asked of the file. Raises NotReadHere beyond `FREE_NUMBERS` and `NUMBERS_A_BYTE`."""
+        if numbers < 0:
+            raise ValueError(f"a negative number of elements, {numbers}")
+        self._given[0] += numbers
+        if self._given[0] > FREE_NUMBERS + NUMBERS_A_BYTE * sum(map(len, self.buffers)):
+            raise NotReadHere("its accessors hold far more than the file does")
+
     def accessor(self, index: int) -> NDArray[Any]:
-        """An accessor's values, (N,) or (N, width), sparse replacements applied. Raises ValueError out of bounds."""
+        """An accessor's values, (N,) or (N, width), sparse replacements applied.
+
+        Raises ValueError out of bounds, NotReadHere for more than a file of this size has to say.
+        """
         accessor = self.items("accessors")[index]
         dtype = np.dtype(DTYPES[accessor["componentType"]])
         width, count = WIDTHS[accessor["type"]], accessor["count"]
+        self._charge(int(count) * width)
         if "bufferView" in accessor:
             view = self.items("bufferViews")[accessor["bufferView"]]
             values = self._strided(
@@ -77,6 +101,7 @@ class Gltf:
             values = np.zeros((count, width), dtype)
         if "sparse" in accessor:
             sparse = accessor["sparse"]
+            self._charge(int(sparse["count"]) * width)
             places, replacements = sparse["indices"], sparse["values"]
             index_type = np.dtype(DTYPES[places["componentType"]])
             rows = self._strided(
@@ -102,6 +127,8 @@ class Gltf:
         data = self.view(view)
         row = dtype.itemsize * width
         step = stride or row
+        if step < row:
+            raise ValueError(f"rows of {row} bytes every {step}")
         end = offset + step * (count - 1) + row
         if count < 1 or offset < 0 or end > len(data):
             raise ValueError(f"{count} elements end at byte {end} of the {len(data)} in bufferView {view}")
@@ -153,33 +180,49 @@ class Gltf:
         scenes = self.items("scenes")
         below = {child for node in nodes for child in node.get("children", [])}
         roots = scenes[self.document.get("scene", 0)].get("nodes", []) if scenes else set(range(len(nodes))) - below
-        pending = [(index, np.eye(4), 0) for index in roots]
+        pending = [(index, np.eye(4)) for index in roots]
+        met: set[int] = set()
         while pending:
-            index, above, depth = pending.pop()
-            if depth > len(nodes):
-                raise ValueError("nodes form a cycle")
+            index, above = pending.pop()
+            if index in met:
+                raise ValueError(f"node {index} has two parents, or nodes form a cycle")
+            met.add(index)
             matrix = above @ _local_matrix(nodes[index])
             if "mesh" in nodes[index]:
                 found.append((int(nodes[index]["mesh"]), matrix))
-            pending += [(child, matrix, depth + 1) for child in nodes[index].get("children", [])]
+            pending += [(child, matrix) for child in nodes[index].get("children", [])]
         return found
 
     def scene_vertices(self) -> NDArray[np.float64]:
         """All vertices (N, 3) float64 of the default scene, y-up: the ASSET frame of files of ours."""
         clouds = [np.empty((0, 3))]
+        count = 0
         for mesh, matrix in self.instances():
             for primitive in range(len(self.items("meshes")[mesh]["primitives"])):
-                clouds.append(_moved(self.mesh_arrays(mesh, primitive)[0], matrix))
+                vertices = self.mesh_arrays(mesh, primitive)[0]
+                count = _counted(count, len(vertices))
+                self._charge(vertices.size)
+                clouds.append(_moved(vertices, matrix))
         return np.concatenate(clouds)
 
     def scene_solids(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
         """Positions and triangles of each mesh of the default scene where it stands there, its seams undone."""
         solids = []
+        count = 0
+        known: dict[int, tuple[NDArray[Any], NDArray[Any]]] = {}
         for mesh, matrix in self.instances():
-            vertices, faces = self.solid_arrays(mesh)
+            vertices, faces = known[mesh] = known[mesh] if mesh in known else self.solid_arrays(mesh)
+            count = _counted(count, max(len(vertices), len(faces)))
+            self._charge(vertices.size + faces.size)
             mirrored = np.linalg.det(matrix[:3, :3]) < 0
             solids.append((_moved(vertices, matrix), faces[:, ::-1] if mirrored else faces))
         return solids
+
+
+def _counted(count: int, more: int) -> int:
+    if count + more > MAX_SCENE_VERTICES:
+        raise NotReadHere(f"more than {MAX_SCENE_VERTICES / 1e6:.0f} million vertices or triangles in its scene")
+    return count + more
 
 
 def _moved(vertices: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[Any]:
@@ -221,10 +264,12 @@ def _resource(path: Path, uri: str) -> bytes:
         import base64
 
         return base64.b64decode(uri.partition(",")[2])
-    target = path.parent / unquote(uri)
-    if not target.is_file():
-        raise ValueError(f"{uri} is not there")
-    return target.read_bytes()
+    try:
+        return read_bytes(path.parent / unquote(uri), MAX_BYTES)
+    except OSError as error:
+        raise ValueError(f"{uri[:80]} is not there ({error.strerror})") from error
+    except ValueError as error:
+        raise ValueError(f"{uri[:80]}: {error}") from error
 
 
 def read_gltf(path: Path | str) -> Gltf:
@@ -235,12 +280,14 @@ def read_gltf(path: Path | str) -> Gltf:
     """
     path = Path(path)
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, MAX_BYTES)
         if path.suffix.lower() == ".gltf":
-            return _with_buffers(json.loads(data), None, path)
+            return _with_buffers(parse_json(data), None, path)
         text, binary = _chunks(data)
-        return _with_buffers(json.loads(text), binary, path)
-    except (OSError, ValueError, KeyError, TypeError, struct.error) as error:
+        return _with_buffers(parse_json(text), binary, path)
+    except OSError as error:
+        raise ExportError(path, f"no readable glTF ({error.strerror})", "check the name") from error
+    except DAMAGE as error:
         raise ExportError(path, f"no readable glTF ({error})", "write it again") from error
 
 

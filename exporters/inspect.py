@@ -12,13 +12,14 @@ from urllib.parse import unquote
 import numpy as np
 
 from exporters.check_tiles import read_tileset
-from exporters.errors import ExportError
-from exporters.facts import file_sizes, solid_facts, texture_size
+from exporters.errors import DAMAGE, ExportError
+from exporters.facts import file_sizes, solid_facts
 from exporters.georeference import placement_of_tile
 from exporters.gltf_reader import Gltf, read_gltf
 from exporters.inspect_places import collection_facts, places_facts
-from exporters.inspect_usd import usd_facts
 from exporters.solid import merged_by_position
+from exporters.texture_files import texture_size
+from exporters.usd_process import usd_facts_apart
 from exporters.validate import read_triangles
 
 
@@ -38,7 +39,7 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ExportError(path, "is not there", "check the name")
     try:
         found = _inspect_any(path)
-    except (AttributeError, ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         if isinstance(error, ExportError):
             raise
         # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
@@ -60,7 +61,7 @@ def _inspect_any(path: Path) -> dict[str, Any]:
     if suffix in (".glb", ".gltf"):
         return _inspect_gltf(path)
     if suffix in (".usda", ".usdc", ".usdz"):
-        return usd_facts(path)
+        return usd_facts_apart(path)
     if suffix in (".ply", ".obj"):
         return _inspect_triangles(path)
     raise ExportError(path, f"cannot inspect suffix {suffix or 'none'}", "see exporters.write.FORMATS")
@@ -70,7 +71,7 @@ def _inspect_gltf(path: Path) -> dict[str, Any]:
     gltf = read_gltf(path)
     try:
         return _gltf_facts(gltf)
-    except (ValueError, LookupError, TypeError) as error:
+    except DAMAGE as error:
         raise ExportError(path, f"broken glTF ({error})", "see validate") from error
 
 

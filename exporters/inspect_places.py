@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 from exporters.check_tiles import read_tileset
 from exporters.errors import ExportError
+from georef.json_file import is_there, read_json
 
 FORMATS = {".czml": "CZML", ".geojson": "GeoJSON"}
 
@@ -18,10 +18,7 @@ def models_of(path: Path) -> tuple[int, list[Path]]:
 
     Raises ExportError for what is no JSON.
     """
-    try:
-        document = json.loads(path.read_bytes())
-    except (OSError, ValueError) as error:
-        raise ExportError(path, f"no readable JSON ({error})", "write it again") from error
+    document = read_json(path, "write it again", ExportError)
     if path.suffix.lower() == ".czml":
         named = [packet["model"].get("gltf") for packet in document if "model" in packet]
     else:
@@ -38,7 +35,7 @@ def places_facts(path: Path, gltf_facts: Any) -> dict[str, Any]:
     """
     count, models = models_of(path)
     own = {"format": FORMATS[path.suffix.lower()], "files": {path.name: path.stat().st_size}}
-    if count != 1 or not models or not models[0].is_file():
+    if count != 1 or not models or not is_there(models[0]):
         return own | {"metadata": {"figures": count}}
     facts: dict[str, Any] = gltf_facts(models[0])
     return facts | own | {"files": own["files"] | facts["files"]}

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.check_usd import open_stage, variations
-from exporters.facts import file_sizes, solid_facts, texture_size
+from exporters.check_usd import open_stage, reason_of, variations
+from exporters.errors import ExportError
+from exporters.facts import file_sizes, solid_facts
+from exporters.texture_files import texture_size
 from exporters.usd import VARIANT_SET
 from exporters.usd_place import anchor_of, heading_of
+from georef.json_file import parse_json
 
 FORMATS = {".usda": "OpenUSD text", ".usdc": "OpenUSD binary", ".usdz": "OpenUSD package"}
 
@@ -23,6 +25,15 @@ def usd_facts(path: Path) -> dict[str, Any]:
     Vertices are in the frame of the default prim; faces of more corners are counted as the triangles of a fan.
     """
     stage = open_stage(path)
+    from pxr import Tf
+
+    try:
+        return _stage_facts(stage, path)
+    except Tf.ErrorException as error:  # binary layers are unpacked as they are asked for
+        raise ExportError(path, reason_of(error), "write it again") from error
+
+
+def _stage_facts(stage: Any, path: Path) -> dict[str, Any]:
     facts = stage.GetRootLayer().customLayerData
     metadata = facts.get("metadata")
     result: dict[str, Any] = {
@@ -30,7 +41,7 @@ def usd_facts(path: Path) -> dict[str, Any]:
         "name": facts.get("name"),
         "copyright": facts.get("copyright"),
         "generator": facts.get("generator"),
-        "metadata": json.loads(metadata) if isinstance(metadata, str) else None,
+        "metadata": parse_json(metadata) if isinstance(metadata, str) else None,
         "placement": _placement(stage.GetDefaultPrim(), dict(facts.get("georeference", {}))),
     }
     lods = []

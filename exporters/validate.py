@@ -11,10 +11,12 @@ import numpy as np
 from exporters.check_gltf import check_gltf
 from exporters.check_places import check_czml, check_geojson
 from exporters.check_tiles import check_tileset
-from exporters.check_usd import check_usd
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.findings import Finding, check_solid
 from exporters.solid import merged_by_position
+from exporters.triangle_files import check_triangle_file, references_of
+from exporters.usd_process import check_usd_apart
+from georef.json_file import is_there
 
 __all__ = ["Finding", "read_triangles", "validate"]
 
@@ -32,7 +34,7 @@ def validate(path: str | os.PathLike[str], external: bool = True) -> list[Findin
         raise ExportError(path, "is not there", "check the name")
     try:
         findings = _check_any(path, external)
-    except (AttributeError, ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+    except DAMAGE as error:
         if isinstance(error, ExportError):
             raise
         # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
@@ -48,7 +50,7 @@ def _check_any(path: Path, external: bool) -> list[Finding]:
     if suffix in (".glb", ".gltf"):
         return check_gltf(path, external)
     if suffix in (".usda", ".usdc", ".usdz"):
-        return check_usd(path)
+        return check_usd_apart(path)
     if suffix in (".ply", ".obj"):
         return _check_triangles(path)
     if suffix == ".czml":
@@ -62,6 +64,7 @@ def read_triangles(path: Path) -> Any:
     """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
     import trimesh
 
+    check_triangle_file(path)
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
     except Exception as error:  # trimesh lets whatever its parsers meet through
@@ -87,17 +90,8 @@ def _check_triangles(path: Path) -> list[Finding]:
 
 def _check_references(path: Path) -> list[Finding]:
     """Files that an OBJ and its material libraries name but that are not there."""
-    missing = []
-    pending = [(path, "mtllib")]
-    while pending:
-        file, keyword = pending.pop()
-        for line in file.read_text(errors="replace").splitlines():
-            word, _, name = line.strip().partition(" ")
-            if word != keyword:
-                continue
-            target = file.parent / name.strip()
-            if not target.is_file():
-                missing.append(Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}"))
-            elif word == "mtllib":
-                pending.append((target, "map_Kd"))
-    return missing
+    return [
+        Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
+        for file, word, name, target in references_of(path)
+        if not is_there(target)
+    ]

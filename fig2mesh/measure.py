@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from exporters.asset import ByteArray, Texture, TexturedMesh
 from exporters.errors import ExportError
 from exporters.solid import merged_by_position, solid_of, unit_normals
+from exporters.triangle_files import check_triangle_file
 from fig2mesh.preview import render_mesh, view_bounds
 
 BoolArray = NDArray[np.bool_]
@@ -150,12 +151,22 @@ def load_textured(path: Path | str) -> TexturedMesh:
     """
     import trimesh
 
+    if Path(path).suffix.lower() in (".ply", ".obj"):
+        check_triangle_file(Path(path))
     try:
         scene = trimesh.load_scene(path, process=False)
         nodes = [scene.graph[name] for name in scene.graph.nodes_geometry]
+        return _textured(scene, nodes, Path(path))
+    except ExportError:
+        raise
     except Exception as error:  # trimesh raises whatever its parsers stumble over
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise ExportError(path, f"cannot be read ({reason})", "give a .glb, .gltf, .ply or .obj file") from None
+
+
+def _textured(scene: Any, nodes: list[Any], path: Path) -> TexturedMesh:
+    import trimesh
+
     if len(nodes) != 1 or not isinstance(scene.geometry[nodes[0][1]], trimesh.Trimesh):
         raise ExportError(path, f"{len(nodes)} meshes", "give a file with exactly one triangle mesh")
     asset_from_node, name = nodes[0]
@@ -176,7 +187,7 @@ def load_textured(path: Path | str) -> TexturedMesh:
             texture = Texture(np.asarray(image.convert("RGBA" if image.mode == "RGBA" else "RGB")))
         if "color" in body.visual.vertex_attributes:
             colors = _srgb(np.asarray(body.visual.vertex_attributes["color"])[:, :3])
-    elif body.visual.kind == "vertex" and Path(path).suffix.lower() in (".ply", ".obj"):
+    elif body.visual.kind == "vertex" and path.suffix.lower() in (".ply", ".obj"):
         colors = np.asarray(body.visual.vertex_colors[:, :3], np.uint8)
     return TexturedMesh(
         vertices=vertices,

@@ -252,3 +252,7 @@ class UvMesh(_Checked):
         self._put("faces", np.int32, (len(self.solid.faces), 3))
         self._put("solid_index", np.int32, (None,))
         self._put("uv", np.float32, (len(self.solid_index), 2))
+        for name, count in (("faces", len(self.solid_index)), ("solid_index", len(self.solid.vertices))):
+            indices = getattr(self, name)
+            if indices.size and (indices.min() < 0 or indices.max() >= count):
+                raise ValueError(f"{name}: index outside the {count} vertices")

@@ -12,17 +12,21 @@ import hashlib
 import json
 import os
 import secrets
-import zipfile
-import zlib
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from exporters.errors import DAMAGE
 from fig2mesh.errors import FigureError, OutputError
+from fig2mesh.record_types import check_fields, fits
 from fig2mesh.records import Figure
 from fig2mesh.settings import STAGES
+from fig2mesh.stage_arrays import read_arrays, text_of
+from georef.json_file import parse_json
+
+REMEDY = "run again with --save-stages and without --resume-from"
 
 
 def _classes() -> dict[str, type]:
@@ -47,6 +51,20 @@ def figure_digest(figure: Figure) -> str:
         digest.update(str(array.shape).encode() + array.tobytes())
     digest.update(repr(sorted(figure.depth_order.items())).encode())
     return digest.hexdigest()
+
+
+def _kinds() -> dict[str, Any]:
+    """What each stage that is kept makes; "request" is what was asked for."""
+    from fig2mesh.mesh.bake import Baked
+    from fig2mesh.mesh.solid import Solid
+    from fig2mesh.parts.outline import Outline
+    from fig2mesh.records import Mesh, PointCloud, Pose3D, Surface, UvMesh
+
+    return {
+        "lift": Pose3D, "parts": Outline, "cloud": PointCloud, "solid": Solid, "simplify": tuple[Mesh, ...],
+        "figure": Figure, "surface": tuple[Surface, ...],
+        "unwrap": tuple[UvMesh, ...], "bake": tuple[Baked, ...], "request": dict[str, Any],
+    }  # fmt: skip
 
 
 def save_stage(folder: Path, stage: str, value: object) -> None:
@@ -91,13 +109,18 @@ def load_stage(folder: Path, stage: str) -> Any:
 def read_result(path: Path, stage: str) -> Any:
     """Read what `write_result` wrote. Raises FigureError for a file that is damaged, or of another stage."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if str(archive["__stage__"]) != stage:
-                raise ValueError(f"it holds {archive['__stage__']}")
-            return _unpack(json.loads(str(archive["__tree__"])), archive, _classes())
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        found = f"not a stage file of this version ({' '.join(str(error).split())[:80]})"
-        raise FigureError(path, found, "run again with --save-stages and without --resume-from") from None
+        arrays = read_arrays(path)
+        if (found := text_of(arrays.pop("__stage__"))) != stage:
+            raise ValueError(f"it holds {found[:40]}")
+        value = _unpack(parse_json(text_of(arrays.pop("__tree__"))), arrays, _classes())
+        if stage in (kinds := _kinds()) and not fits(value, kinds[stage]):
+            raise TypeError(f"it holds a {type(value).__name__}")
+        return value
+    except OSError as error:
+        raise FigureError(path, error.strerror or "cannot be read", REMEDY) from None
+    except DAMAGE as error:
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
+        raise FigureError(path, f"not a stage file of this version ({reason})", REMEDY) from None
 
 
 def _pack(value: Any, arrays: dict[str, Any]) -> Any:
@@ -117,14 +140,20 @@ def _pack(value: Any, arrays: dict[str, Any]) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be kept in a stage file")
 
 
-def _unpack(tree: Any, archive: Any, classes: dict[str, type]) -> Any:
+def _unpack(tree: Any, arrays: dict[str, Any], classes: dict[str, type]) -> Any:
+    if not isinstance(tree, dict):
+        raise TypeError(f"a {type(tree).__name__} in its tree")
     if "record" in tree:
-        fields = {name: _unpack(item, archive, classes) for name, item in tree["fields"].items()}
-        return classes[tree["record"]](**fields)
+        kind = classes[tree["record"]]
+        fields = {name: _unpack(item, arrays, classes) for name, item in tree["fields"].items()}
+        check_fields(kind, fields)
+        return kind(**fields)
     if "array" in tree:
-        return archive[tree["array"]]
+        return arrays[tree["array"]]
     if "tuple" in tree:
-        return tuple(_unpack(item, archive, classes) for item in tree["tuple"])
+        return tuple(_unpack(item, arrays, classes) for item in tree["tuple"])
     if "dict" in tree:
-        return {key: _unpack(item, archive, classes) for key, item in tree["dict"]}
+        return {key: _unpack(item, arrays, classes) for key, item in tree["dict"]}
+    if isinstance(tree["value"], dict | list):
+        raise TypeError("a value that is none")
     return tree["value"]

@@ -6,6 +6,20 @@ code 2 in the command line; anything else is a fault of ours.
 
 from __future__ import annotations
 
+MOST_CHARACTERS = 600
+"""Of each part of a message: a path may be long, a text out of a file has no business to be."""
+
+
+def one_line(text: str) -> str:
+    """A text as one line that a terminal only shows: what it would act on, or cannot encode, becomes a mark.
+
+    Spaces and line breaks become one space each; longer texts than `MOST_CHARACTERS` lose their middle.
+    """
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split()))
+    half = MOST_CHARACTERS // 2
+    return text if len(text) <= MOST_CHARACTERS else f"{text[:half]}…{text[-half:]}"
+
 
 class InputError(ValueError):
     """Input that cannot be used: names the input, the finding and the remedy.
@@ -15,13 +29,15 @@ class InputError(ValueError):
     source : which input (a file name or an option)
     finding : what was found in it
     remedy : what to do about it
+
+    Texts out of files become part of it, so it is made one line of printable characters, see `one_line`.
     """
 
     def __init__(self, source: object, finding: str, remedy: str) -> None:
-        self.source = str(source)
-        self.finding = finding
-        self.remedy = remedy
-        super().__init__(f"{self.source}: {finding}; {remedy}")
+        self.source = one_line(str(source))
+        self.finding = one_line(finding)
+        self.remedy = one_line(remedy)
+        super().__init__(f"{self.source}: {self.finding}; {self.remedy}")
 
 
 class PlacementError(InputError):

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from georef.errors import PlacementError
+from georef.grid_file import check_grid
 from georef.placement import check_lonlat
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def grid_path(datum: str | Path) -> Path | None:
     return path
 
 
-@functools.cache
+@functools.lru_cache(maxsize=16)  # each keeps its file open
 def _shift(path: Path, modified_ns: int) -> Transformer:
     from pyproj import Transformer
 
@@ -93,7 +94,13 @@ def undulation_m(lon_deg: float, lat_deg: float, datum: str | Path) -> float:
     from pyproj.exceptions import ProjError
 
     try:
+        check_grid(path)
         shift = _shift(path, path.stat().st_mtime_ns)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise PlacementError(
+            f"{OPTION} {datum}", f"a damaged grid ({reason})", "give a geoid grid as .gtx or GeoTIFF (.tif)"
+        ) from error
     except ProjError as error:
         raise PlacementError(
             f"{OPTION} {datum}", "PROJ cannot read this as a geoid grid", "give a geoid grid as .gtx or GeoTIFF (.tif)"

@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import unquote, urlsplit
 
+from exporters.errors import DAMAGE
 from exporters.georeference import placement_of_record
 from exporters.gltf_reader import Gltf, read_gltf
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
+from georef.json_file import is_there, read_json
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
@@ -81,7 +83,7 @@ def _read(path: Path) -> GlobeAsset:
         found = {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
         json.dumps(found.facts, allow_nan=False)  # files may hold numbers that no page can
         return found
-    except (AttributeError, KeyError, IndexError, TypeError, ValueError, RecursionError) as error:
+    except DAMAGE as error:
         if isinstance(error, InputError):
             raise
         reason = " ".join(str(error).split())[:120]
@@ -99,7 +101,7 @@ def _model(path: Path) -> GlobeAsset:
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
     facts = {
         "name": path.stem,
-        "credit": asset.get("copyright", ""),
+        "credit": str(asset.get("copyright", "")),
         "metadata": extras.get("metadata", {}),
         # CesiumJS turns models so that they face east at heading 0.
         "place": record | {"entity_heading_deg": cesium_entity_heading_deg(place)},
@@ -171,7 +173,7 @@ def _czml(path: Path) -> GlobeAsset:
         address = model.get("uri") if isinstance(model, dict) else model
         if isinstance(address, str):
             uris.append(address)
-    facts: dict[str, Any] = {"name": packets[0].get("name") or path.stem, "credit": "", "metadata": {}}
+    facts: dict[str, Any] = {"name": str(packets[0].get("name") or path.stem), "credit": "", "metadata": {}}
     return GlobeAsset("czml", path.name, path.parent, tuple(dict.fromkeys(_needed(path, uris))), facts)
 
 
@@ -183,10 +185,7 @@ def _geojson(path: Path) -> GlobeAsset:
 
 
 def _json(path: Path) -> Any:
-    try:
-        return json.loads(path.read_bytes())
-    except ValueError as error:
-        raise InputError(path, f"is no JSON ({error})", "write it again") from error
+    return read_json(path, "write it again")
 
 
 def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
@@ -205,5 +204,5 @@ def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
 
 
 def _check_there(target: Path, by: Path) -> None:
-    if not target.is_file():
+    if not is_there(target):
         raise InputError(by, f"needs {target.name}, which is not there", "write it again, whole")

@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
 from fig2mesh.nets.disn import Disn, DisnShape
+from georef.json_file import parse_json
 
 M = TypeVar("M", bound=nn.Module)
 
@@ -48,9 +49,11 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
         raise InputError(path, "no such file of weights", REINSTALL)
     try:
         with safe_open(path, framework="pt") as stream:
-            facts = json.loads((stream.metadata() or {})[KEY])
+            facts = parse_json((stream.metadata() or {})[KEY])
+            if not isinstance(facts, dict):
+                raise ValueError("facts")
             state = {name: stream.get_tensor(name) for name in stream.keys()}  # noqa: SIM118 - no mapping
-    except (SafetensorError, OSError, KeyError, json.JSONDecodeError) as error:
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(path, f"no readable weights ({type(error).__name__})", REINSTALL) from None
     broken = [name for name, value in state.items() if not torch.isfinite(value).all()]
     if broken:
@@ -67,7 +70,7 @@ def read_module(path: Path, make: Callable[[dict[str, Any]], M], what: str) -> t
     try:
         net = make(facts["shape"])
         net.load_state_dict(state)
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (AttributeError, LookupError, TypeError, ValueError, RuntimeError, ArithmeticError) as error:
         finding = f"not the weights of a {what} ({str(error).splitlines()[0]})"
         raise InputError(path, finding, REINSTALL) from None
     return net.eval().requires_grad_(False), facts

@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_formats import Box, NamedPoints, named_points
 from fig2mesh.parse.joint_names import completed
 from fig2mesh.records import JOINT_NAMES, LIMBS, BoolArray, DepthOrder, FloatArray
+from georef.json_file import read_json
 
 MAX_BYTES = 4 << 20
 """Larger files are no joint files; reading them whole would only cost memory."""
@@ -48,7 +49,7 @@ def read_keypoints(path: Path, picture: str = "", bbox: Box | None = None) -> Jo
     ------
     FigureError : the file cannot be read, or a joint is missing, misnamed or not a pair of finite numbers
     """
-    content = _load(path)
+    content = read_json(path, "give a JSON file with the 21 joints as --keypoints", FigureError, MAX_BYTES)
     named = named_points(content, path, picture, bbox)
     if named is not None:
         return _from_names(named, path)
@@ -91,20 +92,6 @@ def _from_names(named: NamedPoints, path: Path) -> Joints:
     joints = np.array([points[name] for name in JOINT_NAMES], np.float32)
     visible = np.array([named.visible.get(name, False) for name in JOINT_NAMES], np.bool_)
     return Joints(joints, visible, named.size)
-
-
-def _load(path: Path) -> Any:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise FigureError(path, f"larger than {MAX_BYTES >> 20} MiB", "give a joints file, see --keypoints")
-        return json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise FigureError(path, error.strerror or "cannot be read", "check --keypoints") from None
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, FigureError):
-            raise
-        reason = "nested too deeply" if isinstance(error, RecursionError) else f"not JSON ({str(error)[:80]})"
-        raise FigureError(path, reason, "give a JSON file with the 21 joints") from None
 
 
 def _is_number(value: object) -> bool:

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
+from exporters.texture_files import check_scans
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.window import is_large, read_window, size_of
+from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, size_of
 from fig2mesh.records import PART_NAMES, BoolArray, ByteArray
 
-MAX_PIXELS = 178_956_970
-"""Twice Pillow's warning level: decoding more would need gigabytes."""
+OPAQUE = np.array([0, 0, 0, 255], np.uint8)
 
 BAND_PX = 512
 """Rows that are converted to RGBA at a time."""
@@ -60,13 +61,16 @@ def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> View:
 def _open(path: Path, what: str) -> Image.Image:
     """Open and decode a picture, or say in one line why not."""
     try:
+        if path.exists() and not path.is_file():  # a pipe would be waited for, a device never end
+            raise FigureError(path, "cannot be read (no plain file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
         with warnings.catch_warnings():
             # The limit below is ours and explicit; Pillow's warning would only repeat it.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path)
+            image = Image.open(path, formats=FORMATS)
             if image.width * image.height > MAX_PIXELS:
                 found = f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx"
                 raise FigureError(path, found, "pass --bbox X0 Y0 X1 Y1 round the figure")
+            check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
             image.load()
             ImageOps.exif_transpose(image, in_place=True)
             return image
@@ -89,18 +93,39 @@ def _open(path: Path, what: str) -> Image.Image:
 def read_rgba(path: Path) -> ByteArray:
     """(H, W, 4) uint8 of a picture of any mode, upright. Raises FigureError."""
     image = _open(path, "figure")
-    if image.mode.startswith(("I", "F")):
-        # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
-        values = np.asarray(image, np.float64)
-        top = 65535.0 if values.max() > 255 else 255.0
-        image = Image.fromarray(np.clip(values / top * 255.0, 0, 255).astype(np.uint8))
-    # In bands, as Pillow would keep two more copies of the whole picture meanwhile.
+    try:
+        return _rgba(image)
+    except (ValueError, OSError) as error:  # a pixel that names no colour of its palette
+        raise FigureError(path, f"cannot be read ({error})", "give an intact picture as figure") from None
+
+
+def _rgba(image: Image.Image) -> ByteArray:
+    # In bands, as Pillow would keep two more copies of the whole picture meanwhile, and NumPy more of a deep grey one.
     width, height = image.size
+    bands = [(top, min(top + BAND_PX, height)) for top in range(0, height, BAND_PX)]
+    # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
+    deep = image.mode.startswith(("I", "F"))
+    most = max((float(_grey(image, band).max()) for band in bands), default=0.0) if deep else 0.0
+    factor = 255.0 / (65535.0 if most > 255 else 255.0)
+    steps = np.clip(np.arange(65536) * factor, 0, 255).astype(np.uint8)
     rgba = np.empty((height, width, 4), np.uint8)
-    for top in range(0, height, BAND_PX):
-        bottom = min(top + BAND_PX, height)
-        rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
+    for top, bottom in bands:
+        if deep:
+            values = _grey(image, (top, bottom))
+            short = values.dtype.itemsize == 2
+            grey = steps[values] if short else np.clip(values * factor, 0, 255).astype(np.uint8)
+            rgba[top:bottom] = grey[..., None] | OPAQUE
+        else:
+            rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
     return rgba
+
+
+def _grey(image: Image.Image, band: tuple[int, int]) -> NDArray[np.uint16 | np.float64]:
+    """Rows of a picture of one deep channel; where a float one holds no number, 0."""
+    rows = np.asarray(image.crop((0, band[0], image.width, band[1])))
+    if rows.dtype.itemsize == 2:
+        return rows.astype(np.uint16)
+    return np.nan_to_num(rows.astype(np.float64), nan=0.0)
 
 
 def read_mask(path: Path | None, view: View) -> BoolArray | None:
@@ -127,7 +152,7 @@ def read_mask(path: Path | None, view: View) -> BoolArray | None:
 
 def _of_view(path: Path, view: View) -> ByteArray | None:
     """The view's part of a picture beside the figure's; None where that picture is not as large as the figure's."""
-    if is_large(path):
+    if is_large(path) and view.rgba.shape[:2] != view.size[::-1]:
         (x, y), (height, width) = view.corner, view.rgba.shape[:2]
         whole = size_of(path) == view.size
         return read_window(path, (x, y, x + width, y + height))[0] if whole else None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import warnings
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -19,18 +20,31 @@ from fig2mesh.records import ByteArray
 LARGE_PX = 16_000_000
 """Smaller pictures are read whole, which keeps one road for almost all."""
 
+MAX_PIXELS = 178_956_970
+"""Twice Pillow's warning level, of pictures that are decoded whole: 1.5 GB with what is made of them."""
+
+MAX_PIXELS_A_BYTE = 1000
+"""Of larger pictures; a bomb has more. Scans in black and white have 200, JPEGs of nearly empty sheets 80."""
+
+FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "JPEG2000", "GIF", "BMP", "PPM")
+"""What drawings and scans come in. Pillow knows forty more, one of which starts another program (EPS)."""
+
+STREAMED = ("PNG", "JPEG", "MPO", "TIFF", "WEBP", "AVIF", "GIF")
+"""Of these, what libvips reads as well."""
+
 ORIENTATION = 0x0112
 """Exif tag: 1 is upright."""
 
 
 def is_large(path: Path) -> bool:
-    """Whether a picture is worth reading in part; False too where its head cannot be read, or it must be turned."""
+    """Whether a picture is worth reading in part, and can be: not where it must be turned, or its head is damaged."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path)
+            image = Image.open(path, formats=FORMATS)
         with image:
-            return image.width * image.height > LARGE_PX and image.getexif().get(ORIENTATION, 1) == 1
+            upright = image.getexif().get(ORIENTATION, 1) == 1
+            return image.format in STREAMED and image.width * image.height > LARGE_PX and upright
     except Image.DecompressionBombError:
         return True
     except Exception:  # whatever a damaged head raises; reading it whole says what is wrong
@@ -46,10 +60,7 @@ def read_window(path: Path, bbox: tuple[int, int, int, int]) -> tuple[ByteArray,
     Memory is that of the window and some rows. Raises FigureError for a window that is not inside, and for files that
     cannot be read.
     """
-    import pyvips
-
-    # What libvips has to say of a file is in its errors as well.
-    logging.getLogger("pyvips").setLevel(logging.ERROR)
+    pyvips = _libvips()
     x0, y0, x1, y1 = bbox
     try:
         head = pyvips.Image.new_from_file(str(path), access="sequential", fail_on="truncated")
@@ -57,6 +68,10 @@ def read_window(path: Path, bbox: tuple[int, int, int, int]) -> tuple[ByteArray,
         if not (0 <= x0 < x1 <= size[0] and 0 <= y0 < y1 <= size[1]):
             found = f"{x0} {y0} {x1} {y1} is not inside {size[0]}×{size[1]} px"
             raise FigureError("--bbox", found, "give X0 Y0 X1 Y1")
+        if (area := (x1 - x0) * (y1 - y0)) > MAX_PIXELS:
+            found = f"a window of {area / 1e6:.0f} Mpx, more than {MAX_PIXELS / 1e6:.0f} Mpx"
+            raise FigureError("--bbox", found, "pass one round the figure")
+        _check_cost(path, size, bool(head.get_typeof("interlaced")))
         # Tiles may be had in any order; of all else only the rows down to the window are decoded, once.
         image = pyvips.Image.new_from_file(str(path), access="random", fail_on="truncated") if _tiled(head) else head
         window = image.crop(x0, y0, x1 - x0, y1 - y0)
@@ -77,13 +92,37 @@ def read_window(path: Path, bbox: tuple[int, int, int, int]) -> tuple[ByteArray,
 
 def size_of(path: Path) -> tuple[int, int]:
     """(width, height) of a picture of any size; decodes nothing. Raises FigureError."""
-    import pyvips
-
+    pyvips = _libvips()
     try:
         head = pyvips.Image.new_from_file(str(path), access="sequential")
     except pyvips.Error:
         raise FigureError(path, "not a picture that can be read", "give a PNG, JPEG, TIFF or WebP") from None
     return int(head.width), int(head.height)
+
+
+def _libvips() -> Any:
+    """The library, kept from formats whose decoders are not made for files from anywhere (SVG, PDF, ImageMagick's)."""
+    import pyvips
+
+    # What libvips has to say of a file is in its errors as well.
+    logging.getLogger("pyvips").setLevel(logging.ERROR)
+    pyvips.block_untrusted_set(True)
+    # Its cache knows files by their names: one that is written anew would be seen as it was.
+    pyvips.cache_set_max(0)
+    return pyvips
+
+
+def _check_cost(path: Path, size: tuple[int, int], interlaced: bool) -> None:
+    """Raise FigureError for a picture of which no window can be had at a price that its file's size lets expect."""
+    pixels = size[0] * size[1]
+    if pixels <= MAX_PIXELS:
+        return
+    if interlaced:
+        found = f"{size[0]}×{size[1]} px, interlaced or progressive: it would have to be decoded whole"
+        raise FigureError(path, found, "save it again without, or cut the figure out")
+    if pixels > MAX_PIXELS_A_BYTE * (bytes_ := path.stat().st_size):
+        found = f"{size[0]}×{size[1]} px in {bytes_ / 1e3:.0f} kB"
+        raise FigureError(path, found, "cut the figure out, or give an intact picture")
 
 
 def _tiled(image: object) -> bool:

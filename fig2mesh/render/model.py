@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
-from exporters.errors import ExportError
+from exporters.errors import DAMAGE, ExportError
 from exporters.gltf_reader import MESHOPT, Gltf, read_gltf
+from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
 from fig2mesh.measure import load_textured
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
@@ -25,12 +26,32 @@ def read_model(path: Path) -> TexturedMesh:
     if path.suffix.lower() not in (".glb", ".gltf"):
         return load_textured(path)
     gltf = read_gltf(path)
-    packed = sorted(set(gltf.document.get("extensionsRequired", [])) & COMPRESSION)
-    if packed:
-        raise ExportError(path, f"is compressed ({', '.join(packed)})", "give the file written without --profile")
-    mesh = load_textured(path)
-    labels = _gltf_labels(gltf)
+    try:
+        packed = sorted(set(gltf.document.get("extensionsRequired", [])) & COMPRESSION)
+        if packed:
+            raise ExportError(path, f"is compressed ({', '.join(packed)})", "give the file written without --profile")
+        _check_costs(gltf)
+        mesh = load_textured(path)
+        labels = _gltf_labels(gltf)
+    except DAMAGE as error:
+        if isinstance(error, ExportError):
+            raise
+        reason = " ".join(str(error).split())[:120]
+        raise ExportError(path, f"broken glTF ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
     return replace(mesh, parts=labels) if labels is not None and len(labels) == len(mesh.vertices) else mesh
+
+
+def _check_costs(gltf: Gltf) -> None:
+    """Raise ValueError for what trimesh would take on trust: counts, trees of nodes, files beside, their pixels."""
+    gltf.instances()
+    for index in range(len(gltf.items("accessors"))):
+        gltf.accessor(index)
+    for index in range(len(gltf.items("images"))):
+        data = gltf.image(index)
+        with opened(data) as image:
+            if image.width * image.height > MAX_TEXTURE_PX:
+                raise ValueError(f"image {index} has {image.width} x {image.height} px")
+            check_scans(image, data)
 
 
 def _gltf_labels(gltf: Gltf) -> NDArray[np.uint8] | None:

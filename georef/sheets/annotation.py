@@ -7,16 +7,19 @@ the projection of the sheet, is an addition of Allmaps'.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from georef.errors import PlacementError
+from georef.json_file import parse_json
 from georef.sheets.controls import MAX_POINTS, Controls, make_controls, read_text
 
 GEOREFERENCING = "georeferencing"
+
+MAX_HEAD = 2000
+"""Characters of an SVG selector in which the size of the resource is looked for."""
 
 METHODS = {
     "helmert": "helmert",
@@ -65,9 +68,11 @@ def read_annotation(path: Path) -> Controls:
 
 def _parsed(path: Path) -> Any:
     try:
-        return json.loads(read_text(path))
-    except (json.JSONDecodeError, RecursionError):
-        raise PlacementError(path, "it is no JSON", "give a IIIF Georeference annotation") from None
+        return parse_json(read_text(path))
+    except PlacementError:
+        raise
+    except ValueError as error:
+        raise PlacementError(path, str(error), "give a IIIF Georeference annotation") from None
 
 
 def _annotations(document: Any) -> Iterator[dict[str, Any]]:
@@ -133,7 +138,8 @@ def _size(target: Any) -> tuple[float, float] | None:
             if len(sides) == 2:
                 return float(sides[0]), float(sides[1])
     selector = target.get("selector")
-    drawing = str(selector.get("value")) if isinstance(selector, dict) else ""
+    # Of a drawing only its head is looked at: XML is not parsed, and a search through all of it would not end.
+    drawing = str(selector.get("value"))[:MAX_HEAD] if isinstance(selector, dict) else ""
     found = [re.search(rf'<svg[^>]*\b{name}="(\d+(?:\.\d+)?)"', drawing) for name in ("width", "height")]
     numbers = [float(match[1]) for match in found if match is not None]
     return (numbers[0], numbers[1]) if len(numbers) == 2 and min(numbers) > 0 else None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from georef.errors import PlacementError
+from georef.json_file import read_bytes
 
 FloatArray = NDArray[np.float64]
 
@@ -101,12 +102,11 @@ def read_text(path: Path) -> str:
     Raises PlacementError for files that are missing, empty, too large or binary.
     """
     try:
-        if path.stat().st_size > MAX_BYTES:
-            found = f"{path.stat().st_size / 1e6:.0f} MB are no list of control points"
-            raise PlacementError(path, found, f"give at most {MAX_POINTS} control points")
-        content = path.read_bytes()
+        content = read_bytes(path, MAX_BYTES)
     except FileNotFoundError:
         raise PlacementError(path, "no such file", "check the path") from None
+    except ValueError as error:
+        raise PlacementError(path, str(error), f"give a list of at most {MAX_POINTS} control points") from None
     except OSError as error:
         raise PlacementError(path, error.strerror or "cannot be read", "check the path") from None
     if not content.strip():

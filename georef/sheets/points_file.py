@@ -51,7 +51,10 @@ def read_points_file(path: Path) -> Controls:
     enable = header.index("enable") if "enable" in header else None
     rows, left_out = [], 0
     for number, line in table[1:]:
-        words = [word.strip() for word in next(csv.reader([line], delimiter=separator))]
+        try:
+            words = [word.strip() for word in next(csv.reader([line], delimiter=separator))]
+        except csv.Error as error:
+            raise PlacementError(path, f"line {number}: {error}", "give four numbers") from None
         if len(words) > len(header):
             finding = f"line {number} has {len(words)} values under {len(header)} headings"
             raise PlacementError(path, finding, "write numbers with a decimal point")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from georef.errors import PlacementError
+from georef.json_file import parse_json
 from georef.sheets.controls import FloatArray
 
 if TYPE_CHECKING:
@@ -22,6 +23,9 @@ OPTION = "--map-crs"
 WIDE_DEG = 60.0
 """Control points further than this from their middle are those of a map of the world, for which no local plane is
 anywhere near the map's projection."""
+
+MAX_TEXT = 100_000
+"""Characters that name a reference system; the longest WKT of the EPSG registry has 20,000."""
 
 MAX_SEAMS = 24
 """Gaps between longitudes that are tried as the seam of a map of the world."""
@@ -53,10 +57,14 @@ def crs_of(text: str, source: object = OPTION) -> CRS:
     from pyproj import CRS
     from pyproj.exceptions import CRSError
 
-    shown = " ".join(text.split())[:60]
+    shown = " ".join(text[:200].split())[:60]
     try:
+        if len(text) > MAX_TEXT:
+            raise ValueError("too long")
+        if text.lstrip().startswith("{"):
+            parse_json(text)
         crs = CRS.from_user_input(text.strip())
-    except (CRSError, UnicodeError, ValueError):
+    except (CRSError, RecursionError, UnicodeError, ValueError):  # pyproj looks for JSON behind any brace
         raise PlacementError(source, f"{shown!r} is no reference system", "give a code such as EPSG:2056") from None
     if crs.is_compound:
         crs = crs.sub_crs_list[0]

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from pxr import Gf, Usd, UsdGeom, UsdShade
+from pxr import Usd, UsdGeom, UsdShade
 
 from exporters.errors import ExportError
+from exporters.inspect import inspect
 from exporters.usd import write_usd
 from exporters.validate import validate
 from georef.frames import ASSET, ENU
@@ -215,10 +216,19 @@ def test_writing_twice_shows_the_second_version(tmp_path: Path) -> None:
     assert UsdGeom.Mesh.Get(held, "/Figure/Mesh")
     write_usd(asset(lods=(capsule(8, 2),)), path)
     assert validate(path) == []
-    assert len(UsdGeom.Mesh.Get(held, "/Figure/Mesh").GetPointsAttr().Get()) == len(
-        np.unique(capsule(8, 2).solid_index)
-    )
-    assert UsdGeom.Mesh.Get(held, "/Figure/Mesh").GetExtentAttr().Get()[1][1] == Gf.Vec3f(0, 1.8, 0)[1]
+    assert inspect(path)["vertices"] == len(np.unique(capsule(8, 2).solid_index))
+
+
+def test_a_file_that_ends_the_process_that_reads_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_usd(asset(), tmp_path / "a.usda")
+    dying = tmp_path / "python"
+    dying.write_text("#!/bin/sh\nkill -ABRT $$\n")
+    dying.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(dying))
+    (finding,) = validate(tmp_path / "a.usda")
+    assert (finding.code, finding.message) == ("UNREADABLE", "USD breaks down on it (SIGABRT)")
+    with pytest.raises(ExportError, match=r"USD breaks down on it \(SIGABRT\)"):
+        inspect(tmp_path / "a.usda")
 
 
 def test_other_suffixes_are_refused(tmp_path: Path) -> None:

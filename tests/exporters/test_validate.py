@@ -165,7 +165,7 @@ TILES_FAULTS: dict[str, tuple[Callable[[Document], None], str]] = {
     "row-major": (_set("root", "transform", to=np.reshape(_MATRIX, (4, 4)).T.ravel().tolist()), "TRANSFORM"),
     "scaled": (_set("root", "transform", to=[2.0, *_MATRIX[1:]]), "TRANSFORM"),
     "mirrored": (_set("root", "transform", to=[-1.0, *_MATRIX[1:]]), "TRANSFORM"),
-    "not finite": (_set("root", "transform", to=[float("nan"), *_MATRIX[1:]]), "TRANSFORM"),
+    "not finite": (_set("root", "transform", to=[float("nan"), *_MATRIX[1:]]), "UNREADABLE"),
     "child moved away": (
         _set("root", "children", 0, "transform", to=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 0, 0, 1]),
         "OUTSIDE_VOLUME",

@@ -121,8 +121,8 @@ CASES = {
     "missing joint": "l_knee",
     "renamed joint": "left_knee",
     "extra joint": "tail",
-    "nan": "l_knee",
-    "huge": "l_knee",
+    "nan": "NaN is no number",
+    "huge": "larger than 2^64",
     "text joint": "l_knee",
     "outside": "l_knee at (405, 3) is outside",
 }

@@ -310,8 +310,8 @@ HOSTILE = {
     },
     "map.json": {
         "": "it is empty",
-        "{": "it is no JSON",
-        "[" * 100_000: "it is no JSON",
+        "{": "not JSON",
+        "[" * 100_000: "nested too deeply",
         "{}": "no georeference annotations",
         '{"type":"Annotation","body":{"type":"FeatureCollection"}}': "no features",
         '{"body":{"type":"FeatureCollection","features":[{}]}}': "feature 1 has no resourceCoords",
@@ -321,7 +321,7 @@ HOSTILE = {
         '{"body":{"type":"FeatureCollection","features":[{"properties":{"resourceCoords":[1,2]},'
         '"geometry":{"type":"Point","coordinates":[47,188]}}]}}': "longitude first",
         '{"body":{"type":"FeatureCollection","features":[{"properties":{"resourceCoords":[NaN,2]},'
-        '"geometry":{"type":"Point","coordinates":[47,8]}}]}}': "finite",
+        '"geometry":{"type":"Point","coordinates":[47,8]}}]}}': "NaN is no number",
     },
     "map.pgw": {
         "": "it is empty",
@@ -357,7 +357,7 @@ def test_binary_nonsense(tmp_path: Path, suffix: str, content: bytes) -> None:
 def test_a_million_points_are_no_list_of_control_points(tmp_path: Path) -> None:
     path = tmp_path / "map.points"
     path.write_text("mapX,mapY,pixelX,pixelY\n" + "2683000.5,1247000.5,100.25,-200.75\n" * 1_000_000)
-    with pytest.raises(PlacementError, match="35 MB are no list of control points"):
+    with pytest.raises(PlacementError, match="35 MB are more than the 8 MB that are read"):
         read_sheet(path)
 
 

@@ -1,0 +1,90 @@
+"""What PLY and OBJ files say before they are read by trimesh: their size, and the files that they name.
+
+http://paulbourke.net/dataformats/obj/ and http://paulbourke.net/dataformats/mtl/
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from exporters.errors import ExportError
+from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
+from georef.json_file import is_there, read_bytes
+
+MAX_TRIANGLE_BYTES = 256 << 20
+"""Largest PLY or OBJ that is read: some 10 million triangles; trimesh needs about ten times as much memory."""
+
+MAX_LIBRARY_BYTES = 1 << 20
+"""Largest material library."""
+
+MAX_TEXTURE_BYTES = 256 << 20
+
+MAX_REFERENCES = 64
+"""Files that an OBJ and its libraries name; figures have two."""
+
+Reference = tuple[Path, str, str, Path]
+"""The file that names another, by which word, the name, and where that would be."""
+
+
+def references_of(path: Path) -> list[Reference]:
+    """The material libraries that an OBJ names, and the textures that those name, each once.
+
+    Raises ExportError for more than `MAX_REFERENCES`, and for a file that cannot be read.
+    """
+    libraries = list(_named(path, "mtllib", MAX_TRIANGLE_BYTES))
+    there = [library for *_, library in libraries if is_there(library)]
+    found = libraries + [texture for each in there for texture in _named(each, "map_Kd", MAX_LIBRARY_BYTES)]
+    if len(found) > MAX_REFERENCES:
+        raise ExportError(path, f"names {len(found)} files", f"give a model with at most {MAX_REFERENCES}")
+    return found
+
+
+def check_triangle_file(path: Path) -> None:
+    """Raise ExportError for a .ply or .obj that would cost too much, or that names devices, pipes or huge files."""
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise ExportError(path, "no plain file", "give a .ply or .obj file")
+    except OSError as error:
+        raise ExportError(path, error.strerror or "cannot be read", "check the name") from None
+    if size > MAX_TRIANGLE_BYTES:
+        finding = f"{size / 1e6:.0f} MB are more than the {MAX_TRIANGLE_BYTES / 1e6:.0f} MB that are read"
+        raise ExportError(path, finding, "simplify the model")
+    if path.suffix.lower() != ".obj":
+        return
+    for file, word, name, target in references_of(path):
+        if not os.path.exists(target):
+            continue  # for `exporters.validate` to say
+        limit = MAX_LIBRARY_BYTES if word == "mtllib" else MAX_TEXTURE_BYTES
+        try:
+            data = read_bytes(target, limit)
+            if word == "map_Kd":
+                _check_picture(data)
+        except (OSError, ValueError) as error:
+            raise ExportError(file, f"{word} {name[:80]}: {error}", "give the model with its own files") from None
+
+
+def _check_picture(data: bytes) -> None:
+    with opened(data) as image:
+        if image.width * image.height > MAX_TEXTURE_PX:
+            raise ValueError(f"{image.width} x {image.height} px are too many")
+        check_scans(image, data)
+
+
+def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
+    try:
+        data = read_bytes(file, limit)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ExportError(file, reason, "give the model with its own files") from None
+    known = set()
+    for line in data.splitlines():
+        if not line.lstrip().startswith(keyword.encode()):
+            continue
+        word, _, name = line.decode("utf-8", "replace").strip().partition(" ")
+        name = name.strip()
+        if word == keyword and name not in known and "\0" not in name:
+            known.add(name)
+            yield file, word, name, file.parent / name
