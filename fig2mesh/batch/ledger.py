@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from georef.json_file import parse_json
+
 WORK: Final = ".fig2mesh"
 """Folder, in that of the outputs, of everything that reruns go on from."""
 
@@ -43,7 +45,7 @@ class Ledger:
         except (OSError, UnicodeDecodeError):
             return dict(DAMAGED)
         try:
-            record, digest = json.loads(text)
+            record, digest = parse_json(text)
         except (ValueError, TypeError):
             return dict(DAMAGED)
         return record if isinstance(record, dict) and _digest(record) == digest else dict(DAMAGED)

@@ -16,6 +16,7 @@ from typing import Any, Final
 from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.task import Task
 from fig2mesh.batch.tasks import read_spool
+from georef.json_file import parse_json
 
 MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
 
@@ -169,7 +170,7 @@ def _state_path(folder: Path) -> Path:
 def _before(folder: Path) -> dict[str, Any]:
     """What the last run wrote here; nothing where that is not known."""
     with suppress(OSError, ValueError):
-        found = json.loads(_state_path(folder).read_text(encoding="utf-8"))
+        found = parse_json(_state_path(folder).read_bytes())
         if isinstance(found, dict) and isinstance(found.get("files"), dict):
             return {"digest": found.get("digest"), "files": found["files"]}
     return {"digest": None, "files": {}}

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from georef.errors import InputError
-from tests.fuzz import seeds
+from tests.fuzz import collections, seeds
 from tests.fuzz.seeds import Input
 
 
@@ -196,6 +196,8 @@ READERS: dict[str, Reader] = {
     "stage": Reader(seeds.stage_files, read_stage, 3),
     "weights": Reader(seeds.weights, read_weights, 3),
     "globe": Reader(globe_inputs, read_for_globe, 2),
+    "collection": Reader(collections.collections, collections.read_collection, 4),
+    "record": Reader(collections.records, collections.read_record, 1),
 }
 
 
