@@ -16,6 +16,7 @@ from PIL import Image
 
 from fig2mesh.errors import FigureError
 from fig2mesh.records import ByteArray
+from georef.sheets.pictures import orientation_of
 
 LARGE_PX = 16_000_000
 """Smaller pictures are read whole, which keeps one road for almost all."""
@@ -32,9 +33,6 @@ FORMATS = ("PNG", "JPEG", "TIFF", "WEBP", "AVIF", "JPEG2000", "GIF", "BMP", "PPM
 STREAMED = ("PNG", "JPEG", "MPO", "TIFF", "WEBP", "AVIF", "GIF")
 """Of these, what libvips reads as well."""
 
-ORIENTATION = 0x0112
-"""Exif tag: 1 is upright."""
-
 
 def is_large(path: Path) -> bool:
     """Whether a picture is worth reading in part, and can be: not where it must be turned, or its head is damaged."""
@@ -43,7 +41,7 @@ def is_large(path: Path) -> bool:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(path, formats=FORMATS)
         with image:
-            upright = image.getexif().get(ORIENTATION, 1) == 1
+            upright = orientation_of(image) == 1
             return image.format in STREAMED and image.width * image.height > LARGE_PX and upright
     except Image.DecompressionBombError:
         return True

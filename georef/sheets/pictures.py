@@ -64,7 +64,7 @@ def read_picture(path: Path) -> Picture:
                 raise PlacementError(path, "no picture that can be read", "give a PNG, JPEG, TIFF or WebP as the sheet")
             size = (int(image.size[0]), int(image.size[1]))
             tags = dict(getattr(image, "tag_v2", None) or {})
-            turned = image.getexif().get(ORIENTATION, 1)
+            turned = orientation_of(image)
     except PlacementError:
         raise
     except FileNotFoundError:
@@ -83,6 +83,22 @@ def read_picture(path: Path) -> Picture:
         return _georeferenced(path, size, tags)
     except (TypeError, ValueError, IndexError, KeyError):
         raise PlacementError(path, "its GeoTIFF tags are damaged", "give an intact GeoTIFF, or a world file") from None
+
+
+def orientation_of(image: Any) -> int:
+    """The Exif orientation in a picture's head, 1 where it has none: upright.
+
+    image : as Pillow opened it. Its own `getexif` decodes a PNG to the end, where Exif data may also stand.
+    """
+    if image.format != "PNG":
+        return int(image.getexif().get(ORIENTATION, 1))
+    if not image.info.get("exif"):
+        return 1
+    from PIL.Image import Exif
+
+    exif = Exif()
+    exif.load(image.info["exif"])
+    return int(exif.get(ORIENTATION, 1))
 
 
 def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> Picture:

@@ -25,6 +25,7 @@ from exporters.inspect import inspect
 from exporters.validate import validate
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.picture import read_rgba, read_view
+from fig2mesh.parse.window import is_large
 from fig2mesh.record_types import fits
 from fig2mesh.records import Mesh, Pose3D, UvMesh
 from fig2mesh.render.model import read_model
@@ -32,6 +33,7 @@ from fig2mesh.stages import load_stage, save_stage
 from georef.errors import PlacementError
 from georef.heights import undulation_m
 from georef.mapsheet import read_sheet
+from georef.sheets.pictures import read_picture
 from georef.sheets.reference import crs_of
 from tests.fuzz import seeds
 from tests.fuzz.readers import READERS
@@ -78,6 +80,20 @@ def test_a_progressive_picture_of_endless_scans(tmp_path: Path) -> None:
     refused(tmp_path, "a.jpg", data[:-2] + again * 2000 + b"\xff\xd9", "a progressive JPEG of 20.. scans")
     (tmp_path / "b.jpg").write_bytes(data)
     assert read_rgba(tmp_path / "b.jpg").shape == (8000, 8000, 4)
+
+
+def test_heads_are_read_without_decoding(tmp_path: Path) -> None:
+    rows = zlib.compress(b"no rows of a picture")
+    (tmp_path / "a.png").write_bytes(png(40_000, 40_000, rows))
+    assert read_picture(tmp_path / "a.png").size == (40_000, 40_000)
+    (tmp_path / "a.png").write_bytes(png(5_000, 5_000, rows))
+    assert is_large(tmp_path / "a.png")
+    exif = Image.Exif()
+    exif[274] = 6
+    Image.new("L", (5_000, 5_000)).save(tmp_path / "turned.png", exif=exif)
+    assert not is_large(tmp_path / "turned.png")
+    with pytest.raises(PlacementError, match="EXIF orientation"):
+        read_picture(tmp_path / "turned.png")
 
 
 def test_formats_whose_readers_start_other_programs_or_expand_entities(tmp_path: Path) -> None:

@@ -94,7 +94,7 @@ CASES = [
     ("no.glb", None, "not there"),
     ("picture.png", "x", "globe shows no"),
     ("cut.glb", "glTF", "no readable glTF"),
-    ("tileset.json", "{", "no JSON"),
+    ("tileset.json", "{", "not JSON"),
     ("tileset.json", "[1]", "no tileset"),
     ("tileset.json", json.dumps(tileset_of("gone.glb")), "gone.glb"),
     ("tileset.json", json.dumps(tileset_of("https://tiles.example/a.glb")), "elsewhere"),
