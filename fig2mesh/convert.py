@@ -25,8 +25,9 @@ def settings_of(*, quality: Quality, effects: tuple[str, ...], **given: Any) -> 
 
 def _light(effects: tuple[str, ...]) -> bool | None:
     """Whether the surface is lit; None where nothing is said."""
-    if "none" in effects and len(set(effects)) > 1:
-        raise InputError("--effect", f"none beside {effects[0]}", "give either none or the effects wanted")
+    others = [effect for effect in effects if effect != "none"]
+    if "none" in effects and others:
+        raise InputError("--effect", f"none beside {others[0]}", "give either none or the effects wanted")
     return "light" in effects if effects else None
 
 

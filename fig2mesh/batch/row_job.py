@@ -64,6 +64,7 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
             record["key"] = request.key
             if not batch.fresh and before is not None and before.get("key") == request.key and request.stands(before):
                 return _outcome(task, before, unchanged=True)
+            request.check_words()
             _claim(batch, task, ledger, record)
             cache = StageCache(batch.folder / WORK / "stages", batch.fresh)
             record |= _convert(request, cache, advance) | {"status": "done"}
@@ -79,7 +80,7 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
         record["full"] = fault is not None and _full(fault)
         record["seconds"] = round(time.perf_counter() - start, 3)
         if before is not None and record | {"seconds": before.get("seconds")} == before:
-            return _outcome(task, before)  # it failed as it did before
+            record = before  # it failed as it did before
         ledger.write(task.name, record)
     except OSError as error:
         record |= {"status": "failed", "error": f"its record cannot be kept ({error.strerror})"}

@@ -115,14 +115,19 @@ class RowRequest:
                 raise InputError("column format", f"{target} needs a place on earth", "give lon and lat")
         return profile
 
-    def check(self) -> None:
-        """Read the figure's files, as far as they are given, and its sheet. Raises InputError."""
+    def check_words(self) -> None:
+        """Check all that can be without reading the figure. Raises InputError."""
         from fig2mesh.convert import settings_of
-        from fig2mesh.parse.read import read_given
 
         self.profile()
         settings_of(device="cpu", **self.settings())
         self.sheet()
+
+    def check(self) -> None:
+        """Check the words, and read the figure's files as far as they are given. Raises InputError."""
+        from fig2mesh.parse.read import read_given
+
+        self.check_words()
         read_given(**self.files())
 
     def files(self) -> dict[str, Any]:

@@ -213,6 +213,7 @@ BAD = {
     "choose from glb, gltf": {"format": "docx"},
     "ca. 1893": {"date": "ca. 1893"},
     "'superb' is not one of": {"quality": "superb"},
+    "none beside light": {"effect": "none light"},
 }
 
 
@@ -230,6 +231,9 @@ def test_bad_rows_fail_in_one_line_and_leave_nothing(
     message, values = bad
     batch = batch_of(folder, tmp_path)
     checked, converted = check_row(batch, task_of(values)), convert_row(batch, task_of(values))
+    record = Ledger(tmp_path).read("person")
+    assert convert_row(batch, task_of(values)).error == converted.error
+    assert Ledger(tmp_path).read("person") == record
     for outcome in (checked, converted):
         assert outcome.status == "failed"
         assert message in str(outcome.error)
