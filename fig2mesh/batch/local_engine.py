@@ -63,44 +63,45 @@ class LocalEngine:
                 worker.pipe.send(task)
             return True
 
+        def replace(worker: _Worker) -> None:
+            workers.remove(worker)
+            workers.append(self._start())
+            give(workers[-1])
+
         try:
             for _ in range(self._jobs):
                 worker = self._start()
                 workers.append(worker)
                 if not give(worker):
                     break
-            while busy := [worker for worker in workers if worker.task is not None]:
-                for ready in wait([worker.pipe for worker in busy], timeout=1.0):
-                    worker = next(each for each in busy if each.pipe is ready)
+            while busy := {worker.pipe: worker for worker in workers if worker.task is not None}:
+                for pipe in wait(list(busy), timeout=1.0):
+                    worker = busy.pop(pipe)  # type: ignore[call-overload]
                     task = worker.task
                     assert task is not None
                     try:
                         message = worker.pipe.recv()
                     except (EOFError, OSError):
-                        workers.remove(worker)
                         code = self._end(worker)
                         deaths[task.number] = deaths.get(task.number, 0) + 1
                         if deaths[task.number] < TRIES:
                             again.append(task)
                         else:
                             yield _died(task, code)
-                        workers.append(self._start())
-                        give(workers[-1])
+                        replace(worker)
                         continue
                     if isinstance(message, Outcome):
                         give(worker)
                         yield message
                     else:
                         yield Stage(str(worker.process.pid), task.number, task.name, message)
-                for worker in busy:
-                    task = worker.task
-                    if task is not None and time.monotonic() - worker.since > self._timeout_s and worker in workers:
-                        workers.remove(worker)
+                for worker in busy.values():  # those that have said nothing
+                    if worker.task is not None and time.monotonic() - worker.since > self._timeout_s:
+                        task = worker.task
                         worker.process.kill()
                         self._end(worker)
                         yield lost(task, f"took more than {self._timeout_s:g} s; raise --timeout")
-                        workers.append(self._start())
-                        give(workers[-1])
+                        replace(worker)
         finally:
             for worker in workers:
                 if worker.task is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 import time
 from collections.abc import Callable, Mapping
@@ -29,6 +30,8 @@ UNKNOWN_DATE = "0001/9999"
 """A catalogue must have a date; when a file was changed says nothing of the drawing, and is lost by copying."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
+
+STAGING = re.compile(r"\.fig2mesh-\w+-\w+\.tmp/")
 
 LASTING = ("claimed", "files")
 """What a record says of the folder, whatever becomes of the row: whether a batch has begun it, files that are ours."""
@@ -115,7 +118,8 @@ def _full(error: BaseException | None) -> bool:
 
 
 def _line(error: Exception) -> str:
-    return " ".join(str(error).split())[:500] or type(error).__name__
+    # Nobody has to know where files are before they are in place.
+    return " ".join(STAGING.sub("", str(error)).split())[:500] or type(error).__name__
 
 
 def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> None:

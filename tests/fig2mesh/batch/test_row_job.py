@@ -261,6 +261,7 @@ def test_a_full_disk_is_said_and_the_next_run_completes(
         outcome = convert_row(batch_of(folder, tmp_path), task_of(row))
     assert (outcome.status, outcome.full) == ("failed", True)
     assert "No space left on device" in str(outcome.error)
+    assert ".tmp" not in str(outcome.error)
     assert not any((tmp_path / "person").glob("*")) or not (tmp_path / "person").exists()
     _done(convert_row(batch_of(folder, tmp_path), task_of(row)))
 
