@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import logging
 import os
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -145,9 +146,18 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
         with lock:
+            _sweep(folder)
             yield folder
     except Timeout:
         raise OutputError(output, "another batch is writing there", "wait for it, or choose another -o DIR") from None
+
+
+def _sweep(folder: Path) -> None:
+    """Clear away what a killed run had not put in place yet; the folders of figures are cleared by their rows."""
+    for stale in folder.glob(".fig2mesh-*.tmp"):
+        shutil.rmtree(stale, ignore_errors=True)
+    for stale in (folder / WORK).glob("*/*/.*.partial*"):
+        stale.unlink(missing_ok=True)
 
 
 def _tell_unknown(unknown: dict[str, int]) -> None:
