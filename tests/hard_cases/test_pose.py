@@ -167,9 +167,9 @@ NO_NUMBERS = ["NaN", "Infinity", "-Infinity", "1e999", "null", '"12"', "[1]", "1
 @pytest.mark.parametrize("text", NO_NUMBERS)
 @hard_case(
     "a coordinate that is " + ", ".join(NO_NUMBERS),
-    "one line with the joint's name, exit code 2, nothing written",
+    "one line with the joint's name, or with the text that is no finite number of JSON, exit code 2, nothing written",
     "no coordinate is guessed",
 )
 def test_joints_that_are_no_numbers(job: Job, text: str) -> None:
     content = json.dumps({"keypoints": {**PLAIN, "l_knee": ["@", 5, 1]}}).replace('"@"', text)
-    refused(job(painted(MASK), content), "l_knee")
+    refused(job(painted(MASK), content), "l_knee" if text in ("null", '"12"', "[1]") else text)
