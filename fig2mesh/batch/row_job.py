@@ -140,7 +140,7 @@ def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[s
     """Make the outputs; returns what the record says of them."""
     from exporters.placed_figure import figure_of
     from fig2mesh.batch.keys import key_of, stage_keys
-    from fig2mesh.batch.stage_cache import READ
+    from fig2mesh.batch.stage_cache import MEASURES, READ
     from fig2mesh.convert import asset_of, settings_of, torch_device
     from fig2mesh.counters import counting
     from fig2mesh.parse.read import read_figure
@@ -175,7 +175,10 @@ def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[s
         )  # fmt: skip
         advance("write")
         outputs = _write(request, asset, profile)
-        measures = model_measures(asset, results, placed.height_m)
+        shape = key_of(
+            stage=MEASURES, model=keys["model"], height_m=placed.height_m, evidence=request.values["evidence"]
+        )
+        measures = cache.make(MEASURES, shape, lambda: model_measures(asset, results, placed.height_m))
     record = {
         "inputs": request.inputs,
         "outputs": {name: digest for name, (_, digest) in outputs.items()},

@@ -24,6 +24,9 @@ KEPT: Final = ("lift", "solid", "simplify", "surface", "unwrap", "bake")
 """Stages whose results are small and slow to make; "parts" is 50 MB a figure, and only what comes before the mesh and
 the textures needs it."""
 
+MEASURES: Final = "measures"
+"""Name of what is measured on the model, which takes longer than writing it."""
+
 READ: Final = "figure"
 """Name of the result of reading and parsing, which comes before the stages."""
 

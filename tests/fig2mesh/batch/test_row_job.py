@@ -18,7 +18,7 @@ from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.cli import main
 from tests.fig2mesh.batch.small import QUICK, batch_of, task_of, write_pictures
 
-WHOLE = ("figure", "lift", "parts", "body", "solid", "simplify", "surface", "model")
+WHOLE = ("figure", "lift", "parts", "body", "solid", "simplify", "surface", "model", "measures")
 """Stages of a row of `QUICK`."""
 
 
@@ -88,12 +88,15 @@ def test_a_second_run_does_nothing(batch: Batch, row: dict[str, Any]) -> None:
     ("change", "ran"),
     [
         ({"lon": 9.0}, ("model",)),
-        ({"height_m": 3.0}, ("model",)),
+        ({"height_m": 3.0}, ("model", "measures")),
         ({"facing": "N", "credit": "Anna"}, ("model",)),
         ({"artist": "Anna"}, ("model",)),
         ({"format": "ply"}, ("model",)),
-        ({"effect": "none", "format": "glb"}, ("parts", "body", "surface", "model")),  # without light no normals
-        ({"triangles": 600}, ("parts", "body", "simplify", "surface", "model")),
+        (
+            {"effect": "none", "format": "glb"},
+            ("parts", "body", "surface", "model", "measures"),
+        ),
+        ({"triangles": 600}, ("parts", "body", "simplify", "surface", "model", "measures")),
         ({"quality": "standard", "triangles": 800}, WHOLE[2:]),
         ({"keypoints": "person1.json"}, ("figure", "model")),  # other bytes, the same joints
         ({"figure": "person1.png"}, WHOLE),
@@ -277,4 +280,4 @@ def test_a_fault_of_ours_is_recorded_as_such_and_tried_again(
         outcome = convert_row(batch_of(folder, tmp_path), task_of(row))
     assert outcome.ours
     assert outcome.error == "internal error: RuntimeError: a bug"
-    assert _done(convert_row(batch_of(folder, tmp_path), task_of(row))).ran == ("model",)
+    assert _done(convert_row(batch_of(folder, tmp_path), task_of(row))).ran == ("model", "measures")
