@@ -6,7 +6,6 @@ https://github.com/stac-extensions/file
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import posixpath
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any, TextIO
 from urllib.parse import quote
 
+from exporters.file_digest import sha256_of
 from exporters.geojson import OWN_PROPERTIES, feature, free_names
 from exporters.media_types import media_type
 from exporters.placed_figure import PlacedFigure
@@ -84,9 +84,8 @@ class StacItem:
 
 def stac_file(folder: Path, path: str, roles: tuple[str, ...] = ()) -> StacFile:
     """The record of a file that is there; its bytes are read once. Arguments as in `StacFile`."""
-    with (folder / path).open("rb") as stream:
-        digest = hashlib.file_digest(stream, "sha256").hexdigest()
-        return StacFile(path, stream.tell(), digest, roles)
+    file = folder / path
+    return StacFile(path, file.stat().st_size, sha256_of(file), roles)
 
 
 def item_document(item: StacItem, collection: str) -> dict[str, Any]:

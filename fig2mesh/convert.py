@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from fig2mesh.place import Placed
 
 
+SETTING_OPTIONS = (
+    "quality", "triangles", "texture_size", "lods", "parts", "textures", "contours", "effects", "mesher", "closing",
+    "seed",
+)  # fmt: skip
+"""Options of the main job that `settings_of` takes as they are; the device has to be found first."""
+
+
 def settings_of(*, quality: Quality, effects: tuple[str, ...], **given: Any) -> Settings:
     """The settings that the options of the main job ask for.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from exporters.profiles import Profile, profile_named
 from exporters.write import check_outputs, has_levels, in_order, is_tileset, needs_place, write
-from fig2mesh.convert import asset_of, settings_of, torch_device
+from fig2mesh.convert import SETTING_OPTIONS, asset_of, settings_of, torch_device
 from fig2mesh.counters import counting
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.read import read_figure
@@ -111,15 +111,14 @@ def run(
         timings.append(Timing("place", placing_s, peak_mb(), "at --map" if sheet is not None else "at --lonlat"))
     tell(placed, clamp_note(request, targets))
     planned = plan(settings, targets)
-    normals = any(effect.runs for effect in planned.effects if effect.name == "normals")
-    stages = None if save_stages is None else _stages(save_stages, whole, settings, normals, resume_from)
+    stages = None if save_stages is None else _stages(save_stages, whole, settings, planned.normals, resume_from)
     del whole  # four bytes a pixel of what may be a whole sheet
     if specks:
         log.warning("%s: %d specks of the silhouette are too small to model and were left out", figure, specks)
     results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
     written: list[Path] = []
     with progress(quiet) as advance, counting() as counts:
-        road = steps(settings, placed.height_m, normals=normals)
+        road = steps(settings, placed.height_m, normals=planned.normals)
         _run_steps(road, results, timings, stages, resume_from, advance, planned)
         found = results["solid"].how
         if found.components != pieces:
@@ -230,9 +229,9 @@ def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any
     """What `run` would do with the same options; reads and writes nothing."""
     targets = outputs or (figure.stem + ".glb",)
     levels = lods if any(has_levels(target) for target in targets) else 1
-    names = ("quality", "triangles", "texture_size", "parts", "textures", "contours", "effects", "mesher", "closing",
-             "seed")  # fmt: skip
-    return plan(settings_of(lods=levels, device="cpu", **{name: options[name] for name in names}), targets)
+    options["lods"] = levels
+    given = {name: options[name] for name in SETTING_OPTIONS}
+    return plan(settings_of(device="cpu", **given), targets)
 
 
 def check_text(path: Path, overwrite: bool, option: str = "--report", another: str = "--report") -> None:

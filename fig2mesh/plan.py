@@ -35,6 +35,11 @@ class Plan:
     stages: tuple[Planned, ...]
     effects: tuple[Planned, ...]
 
+    @property
+    def normals(self) -> bool:
+        """Whether the model has shading normals."""
+        return any(effect.runs for effect in self.effects if effect.name == "normals")
+
 
 def plan(settings: Settings, outputs: Sequence[str]) -> Plan:
     """What a request needs.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from exporters.asset import Asset
+from exporters.file_digest import sha256_of
 from exporters.sampling import observed_shares
 from fig2mesh import __version__
 from fig2mesh.doctor import PACKAGES, version
@@ -56,8 +56,8 @@ def make_report(
     return {
         "fig2mesh": __version__,
         "figure": {"file": inputs[0].name, "pieces": results["pieces"]},
-        "inputs": {str(path): _sha256(path) for path in inputs},
-        "outputs": {str(path): _sha256(path) for path in outputs},
+        "inputs": {str(path): sha256_of(path) for path in inputs},
+        "outputs": {str(path): sha256_of(path) for path in outputs},
         "settings": asdict(settings),
         "placement": asdict(asset.placement) if asset.placement else None,
         "measures": model_measures(asset, results, height_m),
@@ -97,7 +97,3 @@ def model_measures(asset: Asset, results: dict[str, Any], height_m: float) -> di
 
 def _by_name(shares: dict[int, float]) -> dict[str, float]:
     return {PART_NAMES[label]: share for label, share in shares.items()}
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

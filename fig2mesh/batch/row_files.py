@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import stat
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from exporters.file_digest import sha256_of
 from fig2mesh.batch.row_options import DATUMS, PATHS
 from fig2mesh.errors import InputError
 
@@ -93,5 +93,12 @@ def digest_of(path: Path) -> str:
 
 @lru_cache(maxsize=4096)
 def _digest(path: Path, size: int, changed_ns: int, inode: int) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    return sha256_of(path)
+
+
+def stand(folder: Path, files: dict[str, str]) -> bool:
+    """Whether files are there as they were left. files : path seen from the folder → digest"""
+    try:
+        return all(digest_of(folder / name) == digest for name, digest in files.items())
+    except OSError:
+        return False

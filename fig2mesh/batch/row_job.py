@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -70,7 +70,7 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
             request.check_words()
             _claim(batch, task, ledger, record)
             cache = StageCache(batch.folder / WORK / "stages", batch.fresh)
-            record |= _convert(request, cache, advance) | {"status": "done"}
+            record |= _convert(request, cache, record.get("files", ()), advance) | {"status": "done"}
         except InputError as error:
             fault = error
             # What the disk refuses may go well next time; what is wrong with the input will not.
@@ -136,8 +136,8 @@ def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> 
             shutil.rmtree(stale, ignore_errors=True)
 
 
-def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[str, Any]:
-    """Make the outputs; returns what the record says of them."""
+def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], advance: Advance) -> dict[str, Any]:
+    """Make the outputs in place of the files `before`; returns what the record says of them."""
     from exporters.placed_figure import figure_of
     from fig2mesh.batch.keys import key_of, stage_keys
     from fig2mesh.batch.stage_cache import MEASURES, READ
@@ -164,7 +164,7 @@ def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[s
             replace(drawn, name=request.task.title), settings.voxel, settings.picture_px
         )  # fmt: skip
         placed = place(request.place, sheet, figure, request.values["figure"])
-        normals = any(e.runs for e in plan(settings, request.targets).effects if e.name == "normals")
+        normals = plan(settings, request.targets).normals
         road = steps(settings, placed.height_m, normals=normals)
         results: dict[str, Any] = {"figure": figure, "pieces": pieces}
         keys = stage_keys(figure_digest(figure), settings, normals)
@@ -174,7 +174,7 @@ def _convert(request: RowRequest, cache: StageCache, advance: Advance) -> dict[s
             quality=request.values["quality"], credit=request.values["credit"], evidence=request.values["evidence"],
         )  # fmt: skip
         advance("write")
-        outputs = _write(request, asset, profile)
+        outputs = _write(request, asset, profile, before)
         shape = key_of(
             stage=MEASURES, model=keys["model"], height_m=placed.height_m, evidence=request.values["evidence"]
         )
@@ -209,12 +209,16 @@ def _notes(request: RowRequest, placed: Placed, specks: int, measures: dict[str,
 
 def _levels(request: RowRequest, asset: Asset) -> list[str]:
     """Files of the levels of detail, finest first."""
-    name = request.task.name
-    return [f"{name}.glb", *(f"{name}_lod{level}.glb" for level in range(1, len(asset.lods)))]
+    from exporters.tiles import content_name
+
+    return [content_name(request.task.name, level) for level in range(len(asset.lods))]
 
 
-def _write(request: RowRequest, asset: Asset, profile: Profile) -> dict[str, tuple[int, str]]:
-    """Write all outputs, or none; returns size and digest of each, by its path below the batch's folder."""
+def _write(request: RowRequest, asset: Asset, profile: Profile, before: Sequence[str]) -> dict[str, tuple[int, str]]:
+    """Write all outputs, or none; returns size and digest of each, by its path below the batch's folder.
+
+    before : files that an earlier run has left in the folder of the figure
+    """
     from exporters.write import in_order, write, write_whole
 
     folder = request.batch.folder / request.task.name
@@ -226,7 +230,6 @@ def _write(request: RowRequest, asset: Asset, profile: Profile) -> dict[str, tup
         for level, name in enumerate(_levels(request, asset)[1:], start=1):
             write(replace(asset, lods=(asset.lods[level],)), stage / name, profile=profile)
 
-    before = (Ledger(request.batch.folder).read(request.task.name) or {}).get("files", [])
     outdated = [Path(name).name for name in before]
     files = write_whole(main, main, fill, overwrite=True, outdated=outdated)
     return {

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.batch.row_files import digest_of, input_files, inside, sheet_files
+from fig2mesh.batch.row_files import digest_of, input_files, inside, sheet_files, stand
 from fig2mesh.batch.row_options import RowOptions, options_of
 from fig2mesh.batch.task import Batch, Task
 from fig2mesh.errors import InputError
@@ -95,12 +95,7 @@ class RowRequest:
         """Whether a record of the same key says how this ends: its outputs are there, or its failure is lasting."""
         if record["status"] == "failed":
             return bool(record.get("lasting"))
-        if record["status"] != "done":
-            return False
-        try:
-            return all(digest_of(self.batch.folder / name) == digest for name, digest in record["outputs"].items())
-        except OSError:
-            return False
+        return record["status"] == "done" and stand(self.batch.folder, record["outputs"])
 
     def profile(self) -> Profile:
         """What the client of the outputs takes. Raises InputError where it does not read them."""
@@ -137,9 +132,9 @@ class RowRequest:
 
     def settings(self) -> dict[str, Any]:
         """Arguments of `fig2mesh.convert.settings_of`, but for the device."""
-        names = ("quality", "triangles", "texture_size", "lods", "parts", "textures", "contours", "effects", "mesher",
-                 "closing", "seed")  # fmt: skip
-        return {name: self.values[name] for name in names}
+        from fig2mesh.convert import SETTING_OPTIONS
+
+        return {name: self.values[name] for name in SETTING_OPTIONS}
 
 
 @lru_cache(maxsize=8)

@@ -67,16 +67,18 @@ class StageCache:
             if name in results:
                 return
             step = steps[name]
-            kept = self._load(name, keys[name]) if name in KEPT else None
-            if kept is None:
+
+            def run() -> Any:
                 for each in step.needs:
                     need(each)
                 advance(name)
-                kept = step.run(*(results[each] for each in step.needs))
+                return step.run(*(results[each] for each in step.needs))
+
+            if name in KEPT:
+                results[name] = self.make(name, keys[name], run)
+            else:
+                results[name] = run()
                 self.ran.append(name)
-                if name in KEPT:
-                    self._save(name, keys[name], kept)
-            results[name] = kept
 
         for goal in goals:
             need(goal)

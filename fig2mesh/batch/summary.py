@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from fig2mesh.batch.ledger import WORK, Ledger
+from fig2mesh.batch.row_files import digest_of, stand
 from fig2mesh.batch.task import Task
 from fig2mesh.batch.tasks import read_spool
 from georef.json_file import parse_json
@@ -79,7 +80,7 @@ def summarise(collection: Collection) -> Summary:
             dates.append(record["date"])
     counts = (len(figures), unplaced, failed)
     before = _before(folder)
-    if before["digest"] == digest.hexdigest() and _stand(folder, before["files"]):
+    if before["digest"] == digest.hexdigest() and stand(folder, before["files"]):
         return Summary(*counts, (), tuple(sorted(left)))
     from exporters.write import write_whole
 
@@ -89,7 +90,7 @@ def summarise(collection: Collection) -> Summary:
     outdated = [name for name in before["files"] if not Path(name).is_absolute() and ".." not in Path(name).parts]
     files = write_whole(folder, folder / MANIFEST, fill, overwrite=True, outdated=outdated)
     names = [file.relative_to(folder).as_posix() for file in files]
-    own = {name: _sha256(folder / name) for name in names}
+    own = {name: digest_of(folder / name) for name in names}
     state = {"digest": digest.hexdigest(), "files": own}
     _state_path(folder).write_text(json.dumps(state), encoding="utf-8")
     return Summary(*counts, tuple(names), tuple(sorted(left)))
@@ -174,15 +175,3 @@ def _before(folder: Path) -> dict[str, Any]:
         if isinstance(found, dict) and isinstance(found.get("files"), dict):
             return {"digest": found.get("digest"), "files": found["files"]}
     return {"digest": None, "files": {}}
-
-
-def _stand(folder: Path, files: dict[str, str]) -> bool:
-    try:
-        return all(_sha256(folder / name) == digest for name, digest in files.items())
-    except OSError:
-        return False
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
