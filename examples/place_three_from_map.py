@@ -13,7 +13,7 @@ import json
 import sys
 from pathlib import Path
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 
 EXAMPLES = Path(__file__).resolve().parent
 MAP = EXAMPLES / "maps" / "lake_zurich"

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fig2mesh.field.body import Body
-from fig2mesh.measure_front import thickness_at
+from fig2mesh.image_frame import ImageFrame, image_frame
+from fig2mesh.measure.front import thickness_at
 from fig2mesh.mesh.isosurface import isosurface
-from fig2mesh.parse.frame import ImageFrame, image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.pose.prior import lift

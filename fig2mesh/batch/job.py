@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from fig2mesh.batch.collection import read_rows
+from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.engine import Engine, Stage
 from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.local_engine import LocalEngine
@@ -58,7 +58,7 @@ def run(
 
     Returns the exit code: 0 all rows are done, 2 some are not because of their input, 1 because of us.
     """
-    from fig2mesh.job import configure_logging
+    from fig2mesh.convert.job import configure_logging
 
     configure_logging(quiet, verbose)
     if engine == "dask" and address is None:

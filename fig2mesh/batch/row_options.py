@@ -14,7 +14,7 @@ from typing import Any
 
 import click
 
-from fig2mesh.batch.rows import Value
+from fig2mesh.batch.collections.rows import Value
 from fig2mesh.errors import InputError
 
 OURS = ("output", "overwrite", "save-stages", "resume-from", "report", "quiet", "verbose", "tiles-version",
@@ -50,7 +50,7 @@ class RowOptions:
 
 @cache
 def _command() -> click.Command:
-    from fig2mesh.cli import make
+    from fig2mesh.commands.main import make
 
     return make
 

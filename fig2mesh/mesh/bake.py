@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from fig2mesh.counters import count
 from fig2mesh.field.body import Body
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
 

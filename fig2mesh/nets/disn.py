@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from fig2mesh.parts.kinds import ANCHORS
+from fig2mesh.skeleton import ANCHORS
 
 MASK: Final = 64
 """Pixels of a mask's edge; §4.2, "64x64px masks"."""

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from fig2mesh.nets import weights
-from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import JOINT_MIRROR
 
 WIDTH: Final = 1024
 BLOCKS: Final = 2

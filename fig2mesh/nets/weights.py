@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
 from fig2mesh.nets.disn import Disn, DisnShape
-from georef.json_file import parse_json
+from georef.untrusted.json_file import parse_json
 
 M = TypeVar("M", bound=nn.Module)
 

@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from fig2mesh.parse.joints import decode, doubts, visible_inside
 from fig2mesh.parse.silhouette import refine
-from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, FloatArray
+from fig2mesh.skeleton import JOINT_MIRROR
 
 ROOM: Final = 0.12
 """Space round the figure in the second look, share of its size."""

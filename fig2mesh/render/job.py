@@ -12,9 +12,9 @@ from typing import Any
 
 from PIL import ImageColor
 
-from fig2mesh.convert import torch_device
+from fig2mesh.convert.asset import torch_device
+from fig2mesh.convert.job import check_text, configure_logging, write_text
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.job import check_text, configure_logging, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import ByteArray, Figure
 from fig2mesh.render.counts import Counts
@@ -145,10 +145,10 @@ def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Ite
 
 def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldScene:
     """The part fields of a figure and, where the request shows them, its colours; nothing is meshed."""
-    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.convert.pipeline import make_only, steps
+    from fig2mesh.image_frame import image_frame
     from fig2mesh.parts.pieces import clean
     from fig2mesh.parts.smooth_union import smooth_union
-    from fig2mesh.pipeline import make_only, steps
 
     figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
     textures = needs(request.mode, request.effects).textures

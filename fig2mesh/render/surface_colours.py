@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import framing
 from fig2mesh.field.compiled import sealed
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray
 from fig2mesh.texture.sources import Sources
 

@@ -22,7 +22,7 @@ NAMES = ("farmer", "footballer", "market_woman")
 
 PARENT = """
 import json, resource, sys
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 code = main(sys.argv[1:])
 print(json.dumps({"event": "memory", "kb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}))
 raise SystemExit(code)

@@ -13,7 +13,7 @@ from PIL import Image
 from examples.place_figure import run
 from exporters.inspect import inspect
 from exporters.validate import validate
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 
 ROOT = Path(__file__).parents[2]
 

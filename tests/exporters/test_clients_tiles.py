@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exporters.part_borders import split_at_parts
-from exporters.tiles import write_tileset
-from exporters.tileset_files import write_figures
-from exporters.tileset_tree import tileset_documents
+from exporters.gltf.part_borders import split_at_parts
+from exporters.tiles.gather import write_figures
+from exporters.tiles.tileset import write_tileset
+from exporters.tiles.tree import tileset_documents
 from exporters.write import write
 from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.placement import GeoPlacement
 from tests import py3dtiles
 from tests.exporters.analytic import ZURICH, asset, capsule
 from tests.exporters.test_clients import HEADINGS, PLACES
-from tests.exporters.test_tileset_tree import HIGH, LOW, crowd
+from tests.exporters.tiles.test_tree import HIGH, LOW, crowd
 from tests.node import RunScript
 
 SMALL = (capsule(8, 2),)

@@ -14,7 +14,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from exporters.findings import Finding
-from exporters.gltf_reader import read_gltf
+from exporters.gltf.reader import read_gltf
 from exporters.inspect import inspect
 from exporters.validate import validate
 from exporters.write import write

@@ -16,11 +16,11 @@ from scipy.spatial import cKDTree
 
 from exporters.asset import Asset, Texture, TexturedMesh
 from exporters.errors import ExportError
-from exporters.glb import glb_bytes, write_glb, write_gltf
-from exporters.gltf_reader import Gltf, read_gltf
+from exporters.gltf.glb import glb_bytes, write_glb, write_gltf
+from exporters.gltf.ktx2 import size_of
+from exporters.gltf.part_borders import split_at_parts
+from exporters.gltf.reader import Gltf, read_gltf
 from exporters.inspect import inspect
-from exporters.ktx2 import size_of
-from exporters.part_borders import split_at_parts
 from exporters.profiles import PROFILES, profile_named
 from exporters.validate import validate
 from exporters.write import check_outputs, write

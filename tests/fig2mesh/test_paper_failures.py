@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.field.body import Body
-from fig2mesh.measure_front import flange_share, look
-from fig2mesh.measure_solid import inner_shells
+from fig2mesh.measure.front import flange_share, look
+from fig2mesh.measure.solid import inner_shells
 from fig2mesh.mesh.topology import check_solid
 from fig2mesh.records import JOINT, PART, PART_NAMES
 from tests.drawn import Assembled, Sketch, assemble

@@ -22,7 +22,7 @@ TABLE: list[dict[str, Any]] = [
 
 def collections() -> Iterator[Input]:
     """The same table as every kind of collection."""
-    from tests.fig2mesh.batch.tables import WRITERS
+    from tests.fig2mesh.batch.collections.tables import WRITERS
 
     with tempfile.TemporaryDirectory() as name:
         for file, write in WRITERS.items():
@@ -36,7 +36,7 @@ def collections() -> Iterator[Input]:
 
 def read_collection(path: Path) -> None:
     """Rows, their names, and what they ask for."""
-    from fig2mesh.batch.collection import read_rows
+    from fig2mesh.batch.collections.read import read_rows
     from fig2mesh.batch.row_files import Roots
     from fig2mesh.batch.row_request import RowRequest
     from fig2mesh.batch.task import Batch

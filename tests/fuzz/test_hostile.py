@@ -17,19 +17,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from exporters.b3dm import read_b3dm
 from exporters.errors import ExportError
 from exporters.figure_reader import read_figures
-from exporters.gltf_reader import read_gltf
+from exporters.gltf.reader import read_gltf
 from exporters.inspect import inspect
+from exporters.tiles.b3dm import read_b3dm
 from exporters.validate import validate
+from fig2mesh.convert.record_types import fits
+from fig2mesh.convert.stage_file import load_stage, save_stage
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.picture import read_rgba, read_view
 from fig2mesh.parse.window import is_large
-from fig2mesh.record_types import fits
 from fig2mesh.records import Mesh, Pose3D, UvMesh
 from fig2mesh.render.model import read_model
-from fig2mesh.stages import load_stage, save_stage
 from georef.errors import PlacementError
 from georef.heights import undulation_m
 from georef.mapsheet import read_sheet

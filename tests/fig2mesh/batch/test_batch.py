@@ -18,7 +18,7 @@ import pytest
 
 from exporters.validate import validate
 from fig2mesh.batch.ledger import WORK
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.benchmarks.batch import convert
 from tests.fig2mesh.batch.small import QUICK, events, manifest, tree, write_csv, write_pictures
 

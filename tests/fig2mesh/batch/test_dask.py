@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.fig2mesh.batch.small import QUICK, tree, write_csv, write_pictures
 
 pytest.importorskip("distributed")

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fig2mesh.batch.row_options import OURS, defaults_of, is_known, known_columns, options_of
-from fig2mesh.cli import make
+from fig2mesh.commands.main import make
 from fig2mesh.errors import InputError
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from exporters.czml import write_czml
-from exporters.glb import write_glb, write_gltf
-from exporters.tiles import write_tileset
+from exporters.gis.czml import write_czml
+from exporters.gltf.glb import write_glb, write_gltf
+from exporters.tiles.tileset import write_tileset
 from fig2mesh.errors import InputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files

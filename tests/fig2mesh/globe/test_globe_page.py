@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from exporters.asset import Asset
-from exporters.czml import write_czml
-from exporters.glb import glb_bytes, write_gltf
-from exporters.tiles import write_tileset
+from exporters.gis.czml import write_czml
+from exporters.gltf.glb import glb_bytes, write_gltf
+from exporters.tiles.tileset import write_tileset
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server

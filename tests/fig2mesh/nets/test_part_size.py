@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from fig2mesh.nets.part_size import PartSizeNet, SizeShape, part_size, read_size, save_size, size_path
-from fig2mesh.parts.kinds import JOINT_MIRROR, KINDS, part_centre
 from fig2mesh.records import PART, PART_NAMES
-from fig2mesh.training.loop import seeded
-from fig2mesh.training.train_size import mask_extent, read_sizes, train_size
+from fig2mesh.skeleton import JOINT_MIRROR, KINDS, part_centre
+from fig2mesh.training.networks.loop import seeded
+from fig2mesh.training.networks.train_size import mask_extent, read_sizes, train_size
 
 
 def joints(seed: int = 0) -> np.ndarray:

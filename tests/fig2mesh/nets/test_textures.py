@@ -16,7 +16,7 @@ from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, read
 from fig2mesh.nets.uv_unet import PARTS, UvUnet, UvUnetShape, infer_uv, read_uv, save_uv, uv_inputs
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine, read_refine, refine, save_refine
 from fig2mesh.records import PART
-from fig2mesh.training.loop import seeded
+from fig2mesh.training.networks.loop import seeded
 
 
 def test_a_picture_comes_out_as_large_as_it_went_in() -> None:

@@ -7,9 +7,9 @@ import numpy as np
 from exporters.asset import TexturedMesh
 from fig2mesh.field.analytic import Distance, mannequin, sample, sphere
 from fig2mesh.field.body import Body
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import PART
 from fig2mesh.render.scene import FieldScene
 from fig2mesh.texture.sources import Sources

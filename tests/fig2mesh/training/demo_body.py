@@ -6,9 +6,9 @@ import numpy as np
 
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.records import PART
-from fig2mesh.training.drawing import Layers
-from fig2mesh.training.faces import Face
-from fig2mesh.training.raster import rasterise
+from fig2mesh.training.drawing.draw import Layers
+from fig2mesh.training.drawing.faces import Face
+from fig2mesh.training.drawing.raster import rasterise
 
 MATERIALS = ("skin", "hair", "cloth.shirt", "cloth.trousers", "shoe", "eye")
 HEIGHT = 1.79

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.field.camera import axes
 from fig2mesh.records import JOINT, JOINT_NAMES, PART
-from fig2mesh.training.texture_data import Drawings
+from fig2mesh.training.samples.texture_data import Drawings
 
 SIZE = 64
 QUARTERS = (("head", "torso"), ("l_foot", "r_foot"))

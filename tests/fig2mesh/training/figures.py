@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.records import JOINT_NAMES, PART
-from fig2mesh.training.anny_body import AnnyBodies, face_parts, rest_directions
-from fig2mesh.training.garments import Garment
-from fig2mesh.training.pack import Character, Pack
-from fig2mesh.training.rig import KEY_PARENT, KEYS, PoseSet, Rig
-from fig2mesh.training.stances import stances
+from fig2mesh.training.bodies.anny_body import AnnyBodies, face_parts, rest_directions
+from fig2mesh.training.bodies.garments import Garment
+from fig2mesh.training.bodies.pack import Character, Pack
+from fig2mesh.training.bodies.rig import KEY_PARENT, KEYS, PoseSet, Rig
+from fig2mesh.training.bodies.stances import stances
 
 HEIGHT = 1.79
 PITCH = 0.035

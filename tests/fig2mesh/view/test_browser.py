@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from skimage.metrics import structural_similarity
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from fig2mesh.view.page import EFFECTS
 from tests.browser import Look, pixels
 from tests.drawn import write_figure
