@@ -8,11 +8,13 @@ from collections.abc import Iterator
 
 SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 libopengl0 libusb-1.0-0"
 
+# fmt: off
 PACKAGES = {
     "numpy": "numpy", "scipy": "scipy", "numba": "numba", "torch": "torch", "open3d": "open3d-cpu",
     "pymeshlab": "pymeshlab", "fast_simplification": "fast-simplification", "xatlas": "xatlas", "trimesh": "trimesh",
     "pxr": "usd-core", "pyproj": "pyproj", "skimage": "scikit-image", "safetensors": "safetensors",
-}  # fmt: skip
+}
+# fmt: on
 
 
 def examine() -> Iterator[tuple[str, bool, str]]:

@@ -25,15 +25,19 @@ from georef.geodesy import ecef_from_geodetic
 from georef.placement import GeoPlacement
 from georef.untrusted.json_file import is_there, read_json
 
+# fmt: off
 GEOMETRIES = {
     "Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3,
-}  # fmt: skip
+}
+# fmt: on
 """Kinds of geometry, and how many lists deep their positions are."""
 
+# fmt: off
 HEIGHT_REFERENCES = {
     "NONE", "CLAMP_TO_GROUND", "RELATIVE_TO_GROUND", "CLAMP_TO_TERRAIN", "RELATIVE_TO_TERRAIN",
     "CLAMP_TO_3D_TILE", "RELATIVE_TO_3D_TILE",
-}  # fmt: skip
+}
+# fmt: on
 
 
 def _document(path: Path) -> Any:

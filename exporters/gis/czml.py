@@ -73,10 +73,13 @@ def quaternion(rotation: NDArray[np.float64]) -> list[float]:
     squares = [*(1 - trace + 2 * float(rotation[axis, axis]) for axis in range(3)), 1 + trace]
     largest = int(np.argmax(squares))
     pairs = {
-        (0, 1): rotation[0, 1] + rotation[1, 0], (0, 2): rotation[0, 2] + rotation[2, 0],
-        (1, 2): rotation[1, 2] + rotation[2, 1], (0, 3): rotation[2, 1] - rotation[1, 2],
-        (1, 3): rotation[0, 2] - rotation[2, 0], (2, 3): rotation[1, 0] - rotation[0, 1],
-    }  # fmt: skip
+        (0, 1): rotation[0, 1] + rotation[1, 0],
+        (0, 2): rotation[0, 2] + rotation[2, 0],
+        (1, 2): rotation[1, 2] + rotation[2, 1],
+        (0, 3): rotation[2, 1] - rotation[1, 2],
+        (1, 3): rotation[0, 2] - rotation[2, 0],
+        (2, 3): rotation[1, 0] - rotation[0, 1],
+    }
     values = [
         squares[largest] if axis == largest else float(pairs[min(axis, largest), max(axis, largest)])
         for axis in range(4)
@@ -128,7 +131,9 @@ def write_packets(figures: Iterable[PlacedFigure], stream: TextIO, name: str) ->
     for number, figure in enumerate(figures, 1):
         text = json.dumps(
             packet(figure, f"figure_{number}", figure.contents[0]),
-            ensure_ascii=False, allow_nan=False, separators=(",", ":"),
-        )  # fmt: skip
+            ensure_ascii=False,
+            allow_nan=False,
+            separators=(",", ":"),
+        )
         stream.write(",\n" + text)
     stream.write("\n]\n")

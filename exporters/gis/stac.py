@@ -30,11 +30,13 @@ FILE_EXTENSION = "https://stac-extensions.github.io/file/v2.1.0/schema.json"
 
 COLLECTION_FILE, ITEM_SUFFIX = "collection.json", ".stac.json"
 
+# fmt: off
 RESERVED = (
     "bands", "constellation", "created", "data_type", "datetime", "description", "end_datetime", "gsd", "instruments",
     "keywords", "license", "mission", "nodata", "platform", "providers", "roles", "start_datetime", "statistics",
     "title", "unit", "updated",
-)  # fmt: skip
+)
+# fmt: on
 """Properties to which STAC's common metadata gives a meaning and a form that a user's column need not have."""
 
 SHA2_256 = "1220"

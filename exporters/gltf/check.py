@@ -33,10 +33,12 @@ NOT_HERE = "NOT_READ_HERE"
 MAX_TEXTURES = 4
 """Textures of the largest size whose pixels one file may have decoded: images may name the same bytes."""
 
+# fmt: off
 CODECS = {
     *MESHOPT, "KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_basisu", "KHR_texture_transform",
     "EXT_texture_webp", "EXT_texture_avif",
-}  # fmt: skip
+}
+# fmt: on
 """Extensions that a file has to require, as its data cannot be read without them; common clients know them."""
 
 

@@ -152,12 +152,21 @@ class Document:
         offset = self.fallback + -self.fallback % 8
         self.fallback = offset + rows.nbytes
         packed = {
-            "buffer": 0, "byteOffset": self._append(data), "byteLength": len(data), "byteStride": size,
-            "count": len(rows), "mode": mode, **({"filter": filtered} if filtered else {}),
-        }  # fmt: skip
+            "buffer": 0,
+            "byteOffset": self._append(data),
+            "byteLength": len(data),
+            "byteStride": size,
+            "count": len(rows),
+            "mode": mode,
+            **({"filter": filtered} if filtered else {}),
+        }
         view_item: dict[str, Any] = {
-            "name": name, "buffer": 1, "byteOffset": offset, "byteLength": rows.nbytes, **more,
-        }  # fmt: skip
+            "name": name,
+            "buffer": 1,
+            "byteOffset": offset,
+            "byteLength": rows.nbytes,
+            **more,
+        }
         if target is not None:
             view_item["target"] = target
         return self.add("bufferViews", view_item | {"extensions": {"EXT_meshopt_compression": packed}})

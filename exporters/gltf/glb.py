@@ -93,9 +93,11 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
     indices = document.accessor("indices", corners, ELEMENT_ARRAY_BUFFER, "TRIANGLES")
     attributes = _attributes(document, mesh, node, asset.lit, profile)
     primitive: dict[str, Any] = {
-        "attributes": attributes, "indices": indices, "material": material(document, mesh, asset.lit, profile),
+        "attributes": attributes,
+        "indices": indices,
+        "material": material(document, mesh, asset.lit, profile),
         "mode": 4,
-    }  # fmt: skip
+    }
     item: dict[str, Any] = {"name": asset.name, "primitives": [primitive]}
     if profile.extensions:
         if mesh.parts is not None:

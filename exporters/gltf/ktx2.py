@@ -81,9 +81,7 @@ def padded(mesh: TexturedMesh) -> TexturedMesh:
     # A mask of another size could not be padded by the same share of it.
     same = mesh.observed is not None and mesh.observed.pixels.shape[:2] == (height, width)
     observed = grown(mesh.observed) if mesh.observed is not None and same else None
-    return replace(
-        mesh, texture=grown(mesh.texture), observed=observed, uv=mesh.uv * (width / wide, height / high)
-    )  # fmt: skip
+    return replace(mesh, texture=grown(mesh.texture), observed=observed, uv=mesh.uv * (width / wide, height / high))
 
 
 def size_of(data: bytes) -> tuple[int, int]:

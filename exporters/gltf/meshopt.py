@@ -41,9 +41,7 @@ def decode(data: bytes, extension: dict[str, Any]) -> bytes:
     Raises ExportError without the codec, ValueError for data that is none of its.
     """
     size = int(extension["byteStride"])
-    found = codec().decode_gltf_buffer(
-        data, int(extension["count"]), size, extension["mode"], extension.get("filter")
-    )  # fmt: skip
+    found = codec().decode_gltf_buffer(data, int(extension["count"]), size, extension["mode"], extension.get("filter"))
     return bytes(np.ascontiguousarray(found).tobytes())
 
 

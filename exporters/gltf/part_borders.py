@@ -34,6 +34,12 @@ def split_at_parts(mesh: TexturedMesh) -> TexturedMesh:
         return None if values is None else values[vertex]
 
     return replace(
-        mesh, vertices=mesh.vertices[vertex], faces=place.reshape(-1, 3), normals=of(mesh.normals),
-        solid_index=mesh.solid_index[vertex], uv=of(mesh.uv), colors=of(mesh.colors), parts=label,
-    )  # fmt: skip
+        mesh,
+        vertices=mesh.vertices[vertex],
+        faces=place.reshape(-1, 3),
+        normals=of(mesh.normals),
+        solid_index=mesh.solid_index[vertex],
+        uv=of(mesh.uv),
+        colors=of(mesh.colors),
+        parts=label,
+    )

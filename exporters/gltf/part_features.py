@@ -20,9 +20,7 @@ from exporters.solid import measure_topology, solid_of
 NEAREST, CLAMP_TO_EDGE = 9728, 33071
 
 
-def features(
-    document: Document, asset: Asset, mesh: TexturedMesh, attributes: dict[str, int]
-) -> dict[str, Any]:  # fmt: skip
+def features(document: Document, asset: Asset, mesh: TexturedMesh, attributes: dict[str, int]) -> dict[str, Any]:
     """EXT_mesh_features of a primitive with parts, whose attribute is added to `attributes`; a table of the parts."""
     assert mesh.parts is not None
     labels, rows = np.unique(mesh.parts, return_inverse=True)
@@ -47,16 +45,20 @@ def features(
     if shares is not None:
         description = "Share of the part's surface that the drawing itself shows; the rest is inferred"
         properties["observedShare"] = {
-            "type": "SCALAR", "componentType": "FLOAT32", "required": True, "description": description,
-        }  # fmt: skip
+            "type": "SCALAR",
+            "componentType": "FLOAT32",
+            "required": True,
+            "description": description,
+        }
         values = np.array([shares[int(label)] for label in labels], dtype="<f4")
         columns["observedShare"] = {"values": document.view("part observed shares", values.tobytes())}
     document.used |= {"EXT_mesh_features", "EXT_structural_metadata"}
     schema = {"id": "fig2mesh", "classes": {"part": {"name": "Body part", "properties": properties}}}
     table = {"name": "parts", "class": "part", "count": len(labels), "properties": columns}
     document.json.setdefault("extensions", {})["EXT_structural_metadata"] = {
-        "schema": schema, "propertyTables": [table],
-    }  # fmt: skip
+        "schema": schema,
+        "propertyTables": [table],
+    }
     return {"featureIds": [{"featureCount": len(labels), "attribute": 0, "propertyTable": 0, "label": "part"}]}
 
 
@@ -74,11 +76,14 @@ def evidence(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
         "name": "Surface",
         "properties": {
             "observed": {
-                "type": "SCALAR", "componentType": "UINT8", "normalized": True, "required": True,
+                "type": "SCALAR",
+                "componentType": "UINT8",
+                "normalized": True,
+                "required": True,
                 "description": description,
             },
         },
-    }  # fmt: skip
+    }
     # A PNG whatever the colours are: masks are small, and every client that knows the extension reads it.
     view = document.view("observed", mesh.observed.png)
     image = document.add("images", {"name": "observed", "bufferView": view, "mimeType": "image/png"})

@@ -106,7 +106,7 @@ class Gltf:
             index_type = np.dtype(DTYPES[places["componentType"]])
             rows = self._strided(
                 places["bufferView"], places.get("byteOffset", 0), index_type, sparse["count"], 1, None
-            )  # fmt: skip
+            )
             values = values.copy()
             values[rows[:, 0]] = self._strided(
                 replacements["bufferView"], replacements.get("byteOffset", 0), dtype, sparse["count"], width, None

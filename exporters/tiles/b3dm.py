@@ -26,10 +26,12 @@ HEADER = struct.Struct("<4sIIIIII")
 """magic, version, bytes in all, of the feature table's JSON and binary, of the batch table's JSON and binary."""
 
 MESH_FEATURES, STRUCTURAL_METADATA = "EXT_mesh_features", "EXT_structural_metadata"
+# fmt: off
 SCALARS = {
     "INT8": "<i1", "UINT8": "<u1", "INT16": "<i2", "UINT16": "<u2", "INT32": "<i4", "UINT32": "<u4",
     "FLOAT32": "<f4", "FLOAT64": "<f8",
-}  # fmt: skip
+}
+# fmt: on
 
 
 def b3dm_bytes(glb: bytes, name: Path | str) -> bytes:

@@ -113,8 +113,10 @@ class _Writer:
         numbers: Iterator[int],
     ) -> dict[str, Any]:
         tile: dict[str, Any] = {
-            "boundingVolume": {"box": list(node.box)}, "geometricError": self.error, "refine": "ADD",
-        }  # fmt: skip
+            "boundingVolume": {"box": list(node.box)},
+            "geometricError": self.error,
+            "refine": "ADD",
+        }
         if node is not top and node.count <= limit < top.count:
             file = f"{self.stem}_{next(numbers):0{self.digits}d}.json"
             further.append((node, file))

@@ -78,9 +78,7 @@ def _define_parts(mesh: Any, source: TexturedMesh, part_names: dict[int, str]) -
     for label in np.unique(labels).tolist():
         name = Tf.MakeValidIdentifier(part_names.get(label, f"part_{label}"))
         faces = Vt.IntArray.FromNumpy(np.flatnonzero(labels == label).astype(np.int32))
-        UsdGeom.Subset.CreateUniqueGeomSubset(
-            mesh, name, UsdGeom.Tokens.face, faces, "part", UsdGeom.Tokens.partition
-        )  # fmt: skip
+        UsdGeom.Subset.CreateUniqueGeomSubset(mesh, name, UsdGeom.Tokens.face, faces, "part", UsdGeom.Tokens.partition)
 
 
 def define_material(stage: Any, mesh: Any, texture: str) -> None:

@@ -140,8 +140,9 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
     if not (folder / WORK).is_dir() and not overwrite:
         for name in TAKEN:
             if (folder / name).exists():
-                raise OutputError(folder / name, "exists, and is not of an earlier batch",
-                                  "pass --overwrite or another -o DIR")  # fmt: skip
+                raise OutputError(
+                    folder / name, "exists, and is not of an earlier batch", "pass --overwrite or another -o DIR"
+                )
     try:
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
@@ -184,8 +185,13 @@ def _keep_failure(folder: Path, outcome: Outcome) -> None:
 def _tell(folder: Path, tally: Tally, summary: Summary) -> None:
     log.info(
         "%s: %d figures: %d converted, %d unchanged, %d failed; %d on the globe",
-        folder, tally.total, tally.converted, tally.unchanged, tally.failed, summary.figures,
-    )  # fmt: skip
+        folder,
+        tally.total,
+        tally.converted,
+        tally.unchanged,
+        tally.failed,
+        summary.figures,
+    )
     if summary.unplaced:
         log.info("%d figures have no place and are not in the tileset", summary.unplaced)
     if summary.left:

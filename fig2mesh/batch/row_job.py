@@ -160,9 +160,7 @@ def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], adva
         files = {name: (path.name, digest_of(path)) for name in own if (path := request.values[name]) is not None}
         key = key_of(stage=READ, files=files, bbox=request.values["bbox"])
         drawn = cache.make(READ, key, lambda: read_figure(**request.files(), name=READ))
-        figure, pieces, specks = clean(
-            replace(drawn, name=request.task.title), settings.voxel, settings.picture_px
-        )  # fmt: skip
+        figure, pieces, specks = clean(replace(drawn, name=request.task.title), settings.voxel, settings.picture_px)
         placed = place(request.place, sheet, figure, request.values["figure"])
         normals = plan(settings, request.targets).normals
         road = steps(settings, placed.height_m, normals=normals)
@@ -170,9 +168,15 @@ def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], adva
         keys = stage_keys(figure_digest(figure), settings, normals)
         cache.make_only(("model", "simplify"), road, results, keys, advance)
         asset = asset_of(
-            request.task.title, results["model"], settings, placed, source=request.values["figure"].name,
-            quality=request.values["quality"], credit=request.values["credit"], evidence=request.values["evidence"],
-        )  # fmt: skip
+            request.task.title,
+            results["model"],
+            settings,
+            placed,
+            source=request.values["figure"].name,
+            quality=request.values["quality"],
+            credit=request.values["credit"],
+            evidence=request.values["evidence"],
+        )
         advance("write")
         outputs = _write(request, asset, profile, before)
         shape = key_of(

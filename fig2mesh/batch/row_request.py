@@ -55,12 +55,16 @@ class RowRequest:
         files = input_files(self.values)
         self.inputs: dict[str, str] = {
             self._seen(file): digest_of(file) for name in sorted(files) for file in files[name]
-        }  # fmt: skip
+        }
         texts = {name: self._seen(v) if isinstance(v, Path) else str(v) for name, v in self.values.items()}
         self.key = key_of(
-            options=texts, formats=self.options.formats, date=self.options.date, inputs=self.inputs,
-            attributes=self.options.attributes, title=task.title,
-        )  # fmt: skip
+            options=texts,
+            formats=self.options.formats,
+            date=self.options.date,
+            inputs=self.inputs,
+            attributes=self.options.attributes,
+            title=task.title,
+        )
 
     def _seen(self, file: Path) -> str:
         real, root = Path(os.path.realpath(file)), self.batch.roots.root

@@ -12,15 +12,21 @@ from fig2mesh.commands.options import FILE, figure_files, messages
 @click.command()
 @click.argument("figure", type=FILE)
 @click.option(
-    "-o", "--output", type=FILE, metavar="DIR",
+    "-o",
+    "--output",
+    type=FILE,
+    metavar="DIR",
     help="Folder of keypoints.json, mask.png and part_labels.png; those in it are gone on with, and saved over. "
     "Default: FIGURE's stem + _annotation in the current folder.",
-)  # fmt: skip
+)
 @figure_files
 @click.option(
-    "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
+    "--parts",
+    type=click.Choice(["network", "outline"]),
+    default="network",
+    show_default=True,
     help="How the preview is made; as in the main job.",
-)  # fmt: skip
+)
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free one", metavar="N")
 @click.option("--open/--no-open", "open_", default=True, help="Open the page in a browser.  [default: open]")
 @messages

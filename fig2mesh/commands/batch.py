@@ -14,26 +14,38 @@ from fig2mesh.commands.options import FILE, messages
 @click.option("-o", "--output", type=FILE, metavar="DIR", help="Folder of the outputs.")
 @click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Rows at a time; default: one for each core.")
 @click.option(
-    "--engine", type=click.Choice(["local", "dask"]), default="local", show_default=True,
+    "--engine",
+    type=click.Choice(["local", "dask"]),
+    default="local",
+    show_default=True,
     help="Worker processes of this machine, or a Dask cluster.",
-)  # fmt: skip
+)
 @click.option("--address", metavar="tcp://…", help="Of the Dask scheduler.")
 @click.option(
-    "--resume/--fresh", default=True, show_default=True,
+    "--resume/--fresh",
+    default=True,
+    show_default=True,
     help="Keep what an earlier run has finished, or make everything anew.",
-)  # fmt: skip
+)
 @click.option(
     "--format", "formats", multiple=True, metavar="SUFFIX", help="Made besides .glb, such as usdz; repeatable."
 )
 @click.option("--dry-run", is_flag=True, help="Check every row, report all problems, write nothing.")
 @click.option(
-    "--progress", type=click.Choice(["auto", "bar", "json", "none"]), default="auto", show_default=True,
+    "--progress",
+    type=click.Choice(["auto", "bar", "json", "none"]),
+    default="auto",
+    show_default=True,
     help="json: events on stdout, one a line. With -v the bar shows what each worker does.",
-)  # fmt: skip
+)
 @click.option(
-    "--timeout", type=click.FloatRange(1), default=1800.0, show_default=True, metavar="S",
+    "--timeout",
+    type=click.FloatRange(1),
+    default=1800.0,
+    show_default=True,
+    metavar="S",
     help="Longest that a row may take (local engine).",
-)  # fmt: skip
+)
 @click.option("--root", type=FILE, metavar="DIR", help="Folder that rows' files may not leave; default: COLLECTION's.")
 @click.option("--layer", metavar="NAME", help="Of a GeoPackage; default: the one with a column figure.")
 @click.option("--unplaced", is_flag=True, help="Rows need no place on the earth.")

@@ -59,9 +59,16 @@ def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, shapes
     from fig2mesh.training.samples.build import build as run
 
     run(
-        pack, out, bodies=bodies, valid=valid, seed=seed, jobs=jobs, pictures=pictures, shapes=shapes,
+        pack,
+        out,
+        bodies=bodies,
+        valid=valid,
+        seed=seed,
+        jobs=jobs,
+        pictures=pictures,
+        shapes=shapes,
         report=lambda done, total: click.echo(f"{done} of {total} shards", err=True),
-    )  # fmt: skip
+    )
 
 
 @data.command()
@@ -83,9 +90,15 @@ def crops(pack: Path, out: Path, bodies: int, doodles: int, valid: int, seed: in
     from fig2mesh.training.samples.crop_data import build_crops
 
     build_crops(
-        pack, out, bodies=bodies, doodles=doodles, valid=valid, seed=seed, jobs=jobs,
+        pack,
+        out,
+        bodies=bodies,
+        doodles=doodles,
+        valid=valid,
+        seed=seed,
+        jobs=jobs,
         report=lambda done, total: click.echo(f"{done} of {total} shards", err=True),
-    )  # fmt: skip
+    )
 
 
 @data.command()

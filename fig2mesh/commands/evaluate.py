@@ -49,9 +49,12 @@ def networks(
 @click.argument("folder", type=FOLDER, metavar="DIR")
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option(
-    "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
+    "--parts",
+    type=click.Choice(["network", "outline"]),
+    default="network",
+    show_default=True,
     help="What depths come from: networks, or rules and the outline alone.",
-)  # fmt: skip
+)
 @click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Default: to stdout.")
 @click.option("--json", "json_", is_flag=True, help="Unrounded facts instead of a Markdown table.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")

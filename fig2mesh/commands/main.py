@@ -74,19 +74,27 @@ def cli() -> None:
 @click.argument("figure", type=FILE)
 @place_options
 @click.option(
-    "--altitude-mode", type=click.Choice(["absolute", "clamp"]), default="absolute", show_default=True,
+    "--altitude-mode",
+    type=click.Choice(["absolute", "clamp"]),
+    default="absolute",
+    show_default=True,
     help="clamp: --altitude is above the terrain that a client shows, where the format can say so (CZML).",
-)  # fmt: skip
+)
 @click.option(
-    "-o", "--output", "outputs", multiple=True, metavar="OUT",
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    metavar="OUT",
     help=".glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson, or a folder / tileset.json for 3D Tiles; repeatable. "
     "Default: FIGURE's stem + .glb in the current folder.",
-)  # fmt: skip
+)
 @click.option(
-    "--profile", type=click.Choice(["cesiumjs", "cesiumjs-ktx2", "blender", "qgis", "omniverse"]),
+    "--profile",
+    type=click.Choice(["cesiumjs", "cesiumjs-ktx2", "blender", "qgis", "omniverse"]),
     help="Write for one client: cesiumjs compressed (also with KTX 2 texture), blender and qgis without extensions, "
     "omniverse as binary USD. Default: what every client takes.",
-)  # fmt: skip
+)
 @figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--triangles", type=click.IntRange(200, 2_000_000), metavar="N", help="Triangles of the finest mesh.")
@@ -96,27 +104,40 @@ def cli() -> None:
 )
 @click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
 @click.option(
-    "--tiles-version", type=tileset_cli.TILES_VERSION, default="1.1", show_default=True,
+    "--tiles-version",
+    type=tileset_cli.TILES_VERSION,
+    default="1.1",
+    show_default=True,
     help="Of 3D Tiles; 1.0: content as .b3dm, for older clients.",
-)  # fmt: skip
+)
 @click.option(
-    "--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True,
+    "--parts",
+    type=click.Choice(["network", "outline"]),
+    default="network",
+    show_default=True,
     help="What depths come from: networks, or rules and the outline alone.",
-)  # fmt: skip
+)
 @click.option(
-    "--textures", type=click.Choice(["network", "plain", "none"]),
+    "--textures",
+    type=click.Choice(["network", "plain", "none"]),
     help="Unseen sides as networks paint them (default), or in the plain colours of what is drawn before them (default "
     "with --parts outline); or no texture at all.",
-)  # fmt: skip
+)
 @click.option(
-    "--contours", type=click.Choice(["keep", "drop"]), default="keep", show_default=True,
+    "--contours",
+    type=click.Choice(["keep", "drop"]),
+    default="keep",
+    show_default=True,
     help="The line drawn around the figure: on the surface, like the drawing from the front and a dark band from the "
     "side; or left away, for clients that draw silhouettes.",
-)  # fmt: skip
+)
 @click.option(
-    "--effect", "effects", type=click.Choice(EFFECTS), multiple=True,
+    "--effect",
+    "effects",
+    type=click.Choice(EFFECTS),
+    multiple=True,
     help="light: clients light the surface (default without texture); none: they show it as it is. Repeatable.",
-)  # fmt: skip
+)
 @click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
 @click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
 @click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
@@ -124,9 +145,11 @@ def cli() -> None:
 @click.option("--name", metavar="TEXT", help="What the figure is called in the outputs; default: FIGURE's stem.")
 @click.option("--credit", default="", metavar="TEXT", help="Attribution, kept in the outputs.")
 @click.option(
-    "--evidence/--no-evidence", default=True, show_default=True,
+    "--evidence/--no-evidence",
+    default=True,
+    show_default=True,
     help="Part names and how much of each the drawing showed, as glTF feature ids.",
-)  # fmt: skip
+)
 @click.option("--save-stages", type=FILE, metavar="DIR", help="Keep what each stage made.")
 @click.option("--resume-from", metavar="STAGE", help="Start at STAGE with what --save-stages DIR holds.")
 @click.option("--report", type=FILE, metavar="JSON", help="Seconds, memory, measures, versions, hashes.")

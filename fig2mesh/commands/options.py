@@ -41,40 +41,64 @@ def place_options(command: F) -> F:
     options = (
         click.option("--lonlat", type=float, nargs=2, metavar="LON LAT", help="Place on WGS 84, degrees."),
         click.option(
-            "--map", "map_sheet", type=FILE, metavar="SHEET",
+            "--map",
+            "map_sheet",
+            type=FILE,
+            metavar="SHEET",
             help="Place from a georeferenced map instead: its picture with tags, a world file, .points or a IIIF "
             "annotation beside it; or one of these files.",
         ),
         click.option(
-            "--at", type=float, nargs=2, metavar="X Y",
+            "--at",
+            type=float,
+            nargs=2,
+            metavar="X Y",
             help="Pixel of SHEET where the feet are; default: where they are drawn, if FIGURE is the sheet.",
         ),
         click.option(
-            "--size-from", type=click.Choice(["height", "map"]), default="height", show_default=True,
+            "--size-from",
+            type=click.Choice(["height", "map"]),
+            default="height",
+            show_default=True,
             help="map: as large on the globe as drawn on the map, in place of --height-m.",
         ),
         click.option(
-            "--map-transform", type=click.Choice(TRANSFORMS), default="auto", show_default=True,
+            "--map-transform",
+            type=click.Choice(TRANSFORMS),
+            default="auto",
+            show_default=True,
             help="Fitted to control points; auto: as the file says, or affine.",
         ),
         click.option(
-            "--map-crs", metavar="CRS",
+            "--map-crs",
+            metavar="CRS",
             help="Reference system of the sheet, such as EPSG:2056, where its files name none; for points in longitude "
             "and latitude, the projection to fit in.",
         ),
         click.option(
-            "--facing", default="viewer", metavar="N|NE|…|DEG|viewer", show_default=True,
+            "--facing",
+            default="viewer",
+            metavar="N|NE|…|DEG|viewer",
+            show_default=True,
             help="Compass bearing of the nose; viewer: towards the reader of the map, south without --map.",
         ),
         click.option("--height-m", type=float, metavar="M", help=f"Height of the figure.  [default: {HEIGHT_M}]"),
         click.option(
-            "--altitude", type=float, metavar="M", default=0.0, show_default=True, help="Height of the feet.",
+            "--altitude",
+            type=float,
+            metavar="M",
+            default=0.0,
+            show_default=True,
+            help="Height of the feet.",
         ),
         click.option(
-            "--altitude-datum", default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", show_default=True,
+            "--altitude-datum",
+            default="ellipsoid",
+            metavar="ellipsoid|egm96|GRIDFILE",
+            show_default=True,
             help="What --altitude is measured from.",
         ),
-    )  # fmt: skip
+    )
     for option in reversed(options):
         command = option(command)
     return command

@@ -13,14 +13,20 @@ from fig2mesh.commands.options import FILE, figure_files, messages
 @click.argument("figure", type=FILE, metavar="IMAGE")
 @click.option("-o", "--output", type=FILE, required=True, metavar="DIR", help="Folder for the three files.")
 @click.option(
-    "--format", "kind", type=click.Choice(["fig2mesh", "coco", "labelme", "supervisely"]), default="fig2mesh",
-    show_default=True, help="Of keypoints.json; all of them the main job reads.",
-)  # fmt: skip
+    "--format",
+    "kind",
+    type=click.Choice(["fig2mesh", "coco", "labelme", "supervisely"]),
+    default="fig2mesh",
+    show_default=True,
+    help="Of keypoints.json; all of them the main job reads.",
+)
 @click.option("--all", "whole_sheet", is_flag=True, help="Find all figures of a sheet: figures.json and a folder each.")
 @click.option(
-    "--smallest", type=click.FloatRange(16, 100_000), metavar="PX",
+    "--smallest",
+    type=click.FloatRange(16, 100_000),
+    metavar="PX",
     help="With --all: height of the smallest figures; default: a tenth of the sheet's longer side.",
-)  # fmt: skip
+)
 @figure_files
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 @messages

@@ -16,13 +16,20 @@ TILES_VERSION = click.Choice(["1.0", "1.1"])
 @click.argument("assets", type=FILE, nargs=-1, required=True, metavar="ASSET...")
 @click.option("-o", "--output", type=FILE, required=True, metavar="DIR", help="Folder of the tileset.")
 @click.option(
-    "--visible-from", type=float, default=2000.0, show_default=True, metavar="M",
+    "--visible-from",
+    type=float,
+    default=2000.0,
+    show_default=True,
+    metavar="M",
     help="Distance from which a figure is drawn, on a screen of 1080 rows.",
-)  # fmt: skip
+)
 @click.option(
-    "--tiles-version", type=TILES_VERSION, default="1.1", show_default=True,
+    "--tiles-version",
+    type=TILES_VERSION,
+    default="1.1",
+    show_default=True,
     help="1.0: content as .b3dm, for clients that do not know glTF content.",
-)  # fmt: skip
+)
 @click.option("--link", is_flag=True, help="Hard links to the .glb files instead of copies, where the disk can.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing tileset.")
 @messages

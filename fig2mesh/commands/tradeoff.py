@@ -7,8 +7,10 @@ from pathlib import Path
 import click
 
 FILE = click.Path(path_type=Path)
+# fmt: off
 KNOBS = ("quality", "parts", "precision", "part_nodes", "canvas_px", "voxel", "spacing", "mesher", "closing",
-         "triangles", "texture_size", "textures")  # fmt: skip
+         "triangles", "texture_size", "textures")
+# fmt: on
 """Names of `tradeoff.sweep.KNOBS`, which would load the pipeline."""
 
 

@@ -41,9 +41,16 @@ def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
         click.option("--budget", type=click.FloatRange(0, min_open=True), metavar="MIN", help="Minutes a network."),
         click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True),
         click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True),
-        click.option("-o", "--output", "out", type=FOLDER, required=True, metavar="OUT",
-                     help="Folder for weights, logs and checkpoints; a run that was cut off goes on there."),
-    ]  # fmt: skip
+        click.option(
+            "-o",
+            "--output",
+            "out",
+            type=FOLDER,
+            required=True,
+            metavar="OUT",
+            help="Folder for weights, logs and checkpoints; a run that was cut off goes on there.",
+        ),
+    ]
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
         for option in reversed(options):
@@ -85,10 +92,18 @@ def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device
     )
     known, held = pack_skeletons(_pack(data))
     _, scores = train_pose(
-        known, held, out, shape=shape, augment=not given["plain"], budget_min=_minutes("pose", budget, epochs),
-        steps=None if epochs is None else epochs * 100_000 // given["batch"], seed=given["seed"],
-        dropout=given["dropout"], batch=given["batch"], device=_device(device),
-    )  # fmt: skip
+        known,
+        held,
+        out,
+        shape=shape,
+        augment=not given["plain"],
+        budget_min=_minutes("pose", budget, epochs),
+        steps=None if epochs is None else epochs * 100_000 // given["batch"],
+        seed=given["seed"],
+        dropout=given["dropout"],
+        batch=given["batch"],
+        device=_device(device),
+    )
     _say({name: value for name, value in scores.items() if "_mean_" not in name})
 
 
@@ -105,9 +120,14 @@ def size(
     for kind in chosen or KINDS:
         click.echo(f"{kind}:")
         _, scores = train_size(
-            data, kind, out / f"size-{kind}", budget_min=_minutes("size", budget, epochs),
-            steps=None if epochs is None else 1000 * epochs, seed=seed, device=_device(device),
-        )  # fmt: skip
+            data,
+            kind,
+            out / f"size-{kind}",
+            budget_min=_minutes("size", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            device=_device(device),
+        )
         _say(scores)
 
 
@@ -119,9 +139,17 @@ def size(
 @click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
 @click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run in DIR/disn-….")
 def parts(
-    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, chosen: tuple[str, ...],
-    variant: str, seed: int, lr: float, init: Path | None,
-) -> None:  # fmt: skip
+    data: Path,
+    out: Path,
+    budget: float | None,
+    epochs: int | None,
+    device: str,
+    chosen: tuple[str, ...],
+    variant: str,
+    seed: int,
+    lr: float,
+    init: Path | None,
+) -> None:
     """Shapes of parts (tables 2 and 3)."""
     from fig2mesh.nets.disn import DisnShape
     from fig2mesh.training.networks.train_parts import train_parts
@@ -129,10 +157,17 @@ def parts(
     for kind in chosen or KINDS:
         click.echo(f"{kind}, {variant}:")
         scores = train_parts(
-            data, kind, DisnShape.of(kind, variant), out / f"disn-{kind}-{variant}",
-            budget_min=_minutes("parts", budget, epochs), epochs=epochs, seed=seed, device=_device(device), lr=lr,
+            data,
+            kind,
+            DisnShape.of(kind, variant),
+            out / f"disn-{kind}-{variant}",
+            budget_min=_minutes("parts", budget, epochs),
+            epochs=epochs,
+            seed=seed,
+            device=_device(device),
+            lr=lr,
             init=None if init is None else init / f"disn-{kind}-{variant}",
-        )  # fmt: skip
+        )
         _say(scores)
 
 
@@ -143,17 +178,33 @@ def parts(
 @click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
 @click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
 def uv(
-    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, masks: bool, lr: float,
+    data: Path,
+    out: Path,
+    budget: float | None,
+    epochs: int | None,
+    device: str,
+    seed: int,
+    masks: bool,
+    lr: float,
     init: Path | None,
-) -> None:  # fmt: skip
+) -> None:
     """Texture coordinates (table 4)."""
     from fig2mesh.nets.uv_unet import UvUnetShape
     from fig2mesh.training.networks.train_uv import train_uv
 
-    _say(train_uv(
-        data, out, shape=UvUnetShape(masks), budget_min=_minutes("uv", budget, epochs),
-        steps=None if epochs is None else 1000 * epochs, seed=seed, device=_device(device), rate=lr, init=init,
-    ))  # fmt: skip
+    _say(
+        train_uv(
+            data,
+            out,
+            shape=UvUnetShape(masks),
+            budget_min=_minutes("uv", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            device=_device(device),
+            rate=lr,
+            init=init,
+        )
+    )
 
 
 @train.command()
@@ -163,10 +214,16 @@ def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device
     """Where unseen texels take their colours."""
     from fig2mesh.training.networks.train_fill import train_fill
 
-    _say(train_fill(
-        data, out, budget_min=_minutes("fill", budget, epochs), steps=None if epochs is None else 1000 * epochs,
-        seed=seed, device=_device(device),
-    ))  # fmt: skip
+    _say(
+        train_fill(
+            data,
+            out,
+            budget_min=_minutes("fill", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            device=_device(device),
+        )
+    )
 
 
 def filled(command: Callable[..., None]) -> Callable[..., None]:
@@ -213,17 +270,34 @@ def head(data: Path, out: Path, budget: float | None, epochs: int | None, device
 )
 @click.option("--whole", is_flag=True, help="Train the encoder's first stages too.")
 def parse(
-    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, lr: float,
-    init: Path | None, blazepose: Path | None, whole: bool,
-) -> None:  # fmt: skip
+    data: Path,
+    out: Path,
+    budget: float | None,
+    epochs: int | None,
+    device: str,
+    seed: int,
+    lr: float,
+    init: Path | None,
+    blazepose: Path | None,
+    whole: bool,
+) -> None:
     """Silhouette, parts and joints from a bare picture."""
     from fig2mesh.training.networks.train_parse import train_parse
 
     _check_cpu(device)
-    _say(train_parse(
-        data, out, budget_min=_minutes("parse", budget, epochs), steps=None if epochs is None else 1000 * epochs,
-        seed=seed, rate=lr, init=init, blazepose=blazepose, whole=whole,
-    ))  # fmt: skip
+    _say(
+        train_parse(
+            data,
+            out,
+            budget_min=_minutes("parse", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            rate=lr,
+            init=init,
+            blazepose=blazepose,
+            whole=whole,
+        )
+    )
 
 
 def add_to(cli: click.Group) -> None:

@@ -12,19 +12,26 @@ from fig2mesh.commands.options import FILE, figure_files, messages, place_option
 @click.command()
 @click.argument("figure", type=FILE)
 @click.option(
-    "-o", "--output", type=FILE, metavar="PAGE.html", help="Write the page there instead of showing it.",
-)  # fmt: skip
+    "-o",
+    "--output",
+    type=FILE,
+    metavar="PAGE.html",
+    help="Write the page there instead of showing it.",
+)
 @click.option(
-    "--effects", metavar="NAME,NAME…",
+    "--effects",
+    metavar="NAME,NAME…",
     help="What is on at first: texture, blend, creases, light, ao, outline, smooth-union, perspective, antialias. "
     "Default: all but perspective, and outline only where the drawing's own is not there.",
-)  # fmt: skip
+)
 @place_options
 @click.option(
-    "--cesium", type=FILE, metavar="DIR",
+    "--cesium",
+    type=FILE,
+    metavar="DIR",
     help="The npm package cesium; default: node_modules/cesium in this folder or one above. A page written with -o "
     "loads CesiumJS from the folder cesium beside it.",
-)  # fmt: skip
+)
 @figure_files
 @click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
 @click.option("--parts", type=click.Choice(["network", "outline"]), default="network", show_default=True)

@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     from fig2mesh.convert.place import Placed
 
 
+# fmt: off
 SETTING_OPTIONS = (
     "quality", "triangles", "texture_size", "lods", "parts", "textures", "contours", "effects", "mesher", "closing",
     "seed",
-)  # fmt: skip
+)
+# fmt: on
 """Options of the main job that `settings_of` takes as they are; the device has to be found first."""
 
 

@@ -95,9 +95,19 @@ def run(
         log.info("--lods %d: only 3D Tiles and USD have levels of detail; one is made", lods)
         lods = 1
     settings = settings_of(
-        quality=quality, triangles=triangles, texture_size=texture_size, lods=lods, parts=parts, textures=textures,
-        contours=contours, effects=effects, mesher=mesher, closing=closing, device=torch_device(device), seed=seed,
-    )  # fmt: skip
+        quality=quality,
+        triangles=triangles,
+        texture_size=texture_size,
+        lods=lods,
+        parts=parts,
+        textures=textures,
+        contours=contours,
+        effects=effects,
+        mesher=mesher,
+        closing=closing,
+        device=torch_device(device),
+        seed=seed,
+    )
     from fig2mesh.convert.pipeline import steps
     from fig2mesh.parts.pieces import clean
 
@@ -124,16 +134,26 @@ def run(
         if found.components != pieces:
             log.warning("%s: %d solids for %d drawn pieces; %s", figure, found.components, pieces, found.note)
         asset = asset_of(
-            drawn.name, results["model"], settings, placed, source=figure.name, quality=quality, credit=credit,
+            drawn.name,
+            results["model"],
+            settings,
+            placed,
+            source=figure.name,
+            quality=quality,
+            credit=credit,
             evidence=evidence,
-        )  # fmt: skip
+        )
         for target in in_order(targets):
             advance(f"write {target}")
             start = time.perf_counter()
             written += write(
-                asset, target, overwrite=overwrite, visible_from_m=visible_from, tiles_version=tiles_version,
+                asset,
+                target,
+                overwrite=overwrite,
+                visible_from_m=visible_from,
+                tiles_version=tiles_version,
                 profile=client,
-            )  # fmt: skip
+            )
             timings.append(Timing(f"write {target}", time.perf_counter() - start, peak_mb(), "an output"))
     if report is not None:
         inputs = [path for path in (figure, mask, keypoints, part_labels) if path is not None]

@@ -104,9 +104,14 @@ def steps(settings: Settings, height_m: float, *, normals: bool = True) -> tuple
 
         inferred = settings.textures == "network"
         return make_sources(
-                figure, frame, outline, settings.texture_size, settings.seed, ask if inferred else None,
-                contours=settings.contours == "keep",
-            )  # fmt: skip
+            figure,
+            frame,
+            outline,
+            settings.texture_size,
+            settings.seed,
+            ask if inferred else None,
+            contours=settings.contours == "keep",
+        )
 
     def bake_levels(figure: Figure, sources: Sources, body: Body, unwrapped: tuple[UvMesh, ...]) -> tuple[Baked, ...]:
         frame = image_frame(figure)

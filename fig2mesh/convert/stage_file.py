@@ -61,10 +61,17 @@ def _kinds() -> dict[str, Any]:
     from fig2mesh.records import Mesh, PointCloud, Pose3D, Surface, UvMesh
 
     return {
-        "lift": Pose3D, "parts": Outline, "cloud": PointCloud, "solid": Solid, "simplify": tuple[Mesh, ...],
-        "figure": Figure, "surface": tuple[Surface, ...],
-        "unwrap": tuple[UvMesh, ...], "bake": tuple[Baked, ...], "request": dict[str, Any],
-    }  # fmt: skip
+        "lift": Pose3D,
+        "parts": Outline,
+        "cloud": PointCloud,
+        "solid": Solid,
+        "simplify": tuple[Mesh, ...],
+        "figure": Figure,
+        "surface": tuple[Surface, ...],
+        "unwrap": tuple[UvMesh, ...],
+        "bake": tuple[Baked, ...],
+        "request": dict[str, Any],
+    }
 
 
 def save_stage(folder: Path, stage: str, value: object) -> None:

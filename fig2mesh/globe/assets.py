@@ -23,9 +23,11 @@ from georef.untrusted.json_file import is_there, read_json
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
+# fmt: off
 SUFFIXES: dict[str, Kind] = {
     ".glb": "model", ".gltf": "model", ".json": "tileset", ".czml": "czml", ".geojson": "geojson",
-}  # fmt: skip
+}
+# fmt: on
 
 
 @dataclass(frozen=True)

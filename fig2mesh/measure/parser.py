@@ -58,8 +58,11 @@ def evaluate_parse(folder: Path, say: Callable[[str], None] = lambda line: None)
 
 def drawings(folder: Path) -> list[Path]:
     """The folders under `folder` that hold image.png, mask.png and keypoints.json."""
-    found = [each for each in sorted(folder.iterdir()) if each.is_dir()
-             and all((each / name).is_file() for name in ("image.png", "mask.png", "keypoints.json"))]  # fmt: skip
+    found = [
+        each
+        for each in sorted(folder.iterdir())
+        if each.is_dir() and all((each / name).is_file() for name in ("image.png", "mask.png", "keypoints.json"))
+    ]
     if not found:
         raise InputError(
             folder, "no annotated drawings", "each needs a folder with image.png, mask.png, keypoints.json"
@@ -103,9 +106,14 @@ def score(
             crossed = np.linalg.norm(place[[here, there]] - joints[[there, here]], axis=1).sum()
             right.append(same < crossed)
     return Score(
-        name, both, float((off < 0.05)[visible].mean()), float((off < 0.1)[visible].mean()),
-        float(np.mean(right)) if right else 1.0, float((seen == visible).mean()), found.doubts,
-    )  # fmt: skip
+        name,
+        both,
+        float((off < 0.05)[visible].mean()),
+        float((off < 0.1)[visible].mean()),
+        float(np.mean(right)) if right else 1.0,
+        float((seen == visible).mean()),
+        found.doubts,
+    )
 
 
 def bare(rgba: ByteArray, ground: str) -> ByteArray:
@@ -127,11 +135,15 @@ def bare(rgba: ByteArray, ground: str) -> ByteArray:
 
 def table(scores: list[Score]) -> str:
     """A Markdown table, the mean last."""
-    lines = ["| figure | silhouette IoU | PCK@0.05 | PCK@0.1 | sides | visibility | the parser's own doubts |",
-             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    lines = [
+        "| figure | silhouette IoU | PCK@0.05 | PCK@0.1 | sides | visibility | the parser's own doubts |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for each in (*scores, _mean(scores)):
-        lines.append(f"| {each.name} | {each.iou:.3f} | {each.pck05:.2f} | {each.pck10:.2f} | {each.sides:.2f} "
-                     f"| {each.seen:.2f} | {'; '.join(each.doubts)} |")  # fmt: skip
+        lines.append(
+            f"| {each.name} | {each.iou:.3f} | {each.pck05:.2f} | {each.pck10:.2f} | {each.sides:.2f} "
+            f"| {each.seen:.2f} | {'; '.join(each.doubts)} |"
+        )
     return "\n".join(lines) + "\n"
 
 

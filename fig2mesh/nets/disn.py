@@ -130,10 +130,13 @@ class Disn(nn.Module):
         self.shape = shape
         self.levels = nn.ModuleList(
             nn.Sequential(
-                nn.Conv2d(c_in, c_out, 3, stride=2, padding=1), nn.ReLU(),
-                nn.Conv2d(c_out, c_out, 3, padding=1), nn.ReLU(),
-            ) for c_in, c_out in itertools.pairwise((1, *FILTERS))
-        )  # fmt: skip
+                nn.Conv2d(c_in, c_out, 3, stride=2, padding=1),
+                nn.ReLU(),
+                nn.Conv2d(c_out, c_out, 3, padding=1),
+                nn.ReLU(),
+            )
+            for c_in, c_out in itertools.pairwise((1, *FILTERS))
+        )
         self.overall = nn.Linear(FILTERS[-1] * (MASK >> len(FILTERS)) ** 2, GLOBAL)
         self.point = _pointwise()
         pose = {}

@@ -89,7 +89,7 @@ def parse_sheet(sheet: Path, folder: Path, kind: str, smallest: float | None, ov
             found = figure.found
             inside = Annotation(
                 found.mask, found.joints_px, found.visible, found.part_labels, confidence=found.confidence
-            )  # fmt: skip
+            )
             (stage / name).mkdir()
             save_annotation(stage / name, inside, sheet.name, kind, view.size, figure.bbox[:2])
         text = json.dumps(coco_of(figures, names, view.size, sheet.name), indent=1, ensure_ascii=False)
@@ -123,11 +123,15 @@ def coco_of(figures: list[SheetFigure], names: list[str], size: tuple[int, int],
         document["annotations"].append(
             annotation
             | {
-                "id": number, "bbox": [x0, y0, x1 - x0, y1 - y0], "area": int(found.mask.sum()),
+                "id": number,
+                "bbox": [x0, y0, x1 - x0, y1 - y0],
+                "area": int(found.mask.sum()),
                 "segmentation": [outline.reshape(-1).tolist() for outline in outlines if len(outline) > 3],
-                "score": round(figure.confidence, 3), "doubts": list(found.doubts), "folder": name,
+                "score": round(figure.confidence, 3),
+                "doubts": list(found.doubts),
+                "folder": name,
             }
-        )  # fmt: skip
+        )
     return document
 
 
@@ -136,5 +140,5 @@ def annotation_of(found: Reading) -> Annotation:
     figure = found.figure
     window = Annotation(
         figure.mask, figure.joints_px, figure.visible, found.part_labels, figure.depth_order, found.confidence
-    )  # fmt: skip
+    )
     return on_whole_picture(window, found.view.corner, found.view.size)

@@ -65,11 +65,14 @@ def network_parts(
     grids = decode_many(nets, {part: (given.mask, given.anchors) for part, given in inputs.items()}, nodes)
     return tuple(
         PartSdf(
-            part, grids[part] * np.float32(given.edge / 2), given.centre.astype(np.float32), given.edge,
+            part,
+            grids[part] * np.float32(given.edge / 2),
+            given.centre.astype(np.float32),
+            given.edge,
             bool(given.mask.any()),
         )
         for part, given in inputs.items()
-    )  # fmt: skip
+    )
 
 
 class PartInput(NamedTuple):

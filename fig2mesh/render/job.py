@@ -105,10 +105,18 @@ def run(
     if sun is not None and not sun.up:
         log.info("the sun is %.1f° below the horizon: only the sky's light is left", -sun.elevation_deg)
     request = Request(
-        mode, wanted, size, yaw, pitch, samples, paper, ground,
+        mode,
+        wanted,
+        size,
+        yaw,
+        pitch,
+        samples,
+        paper,
+        ground,
         towards_sun(sun, bearing) if sun is not None and sun.up else None,
-        outline_width, _colour("--outline-colour", outline_colour),
-    )  # fmt: skip
+        outline_width,
+        _colour("--outline-colour", outline_colour),
+    )
 
     start = time.perf_counter()
     if fields:

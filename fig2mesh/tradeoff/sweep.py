@@ -34,11 +34,13 @@ KNOBS: Final[Mapping[str, tuple[Any, ...]]] = {
 }
 """Knob → values beside the standard preset's own; the others stay as in that preset. "quality" is all at once."""
 
+# fmt: off
 STAGES_OF: Final[Mapping[str, str]] = {
     "parts": "parts", "precision": "parts", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts",
     "spacing": "cloud", "mesher": "solid", "closing": "solid", "triangles": "simplify", "texture_size": "bake",
     "textures": "textures",
-}  # fmt: skip
+}
+# fmt: on
 """Knob → the stage that it is about."""
 
 

@@ -50,10 +50,13 @@ def test_cesium_draws_just_the_figures_within_the_distance(
         (tmp_path / name).write_text(json.dumps(document))
     random = np.random.default_rng(5)
     views = [
-        {"lon_deg": 8.5 + x * visible_from / 111e3, "lat_deg": 47.4 + y * visible_from / 111e3,
-         "height_m": 5000 + z * visible_from}
+        {
+            "lon_deg": 8.5 + x * visible_from / 111e3,
+            "lat_deg": 47.4 + y * visible_from / 111e3,
+            "height_m": 5000 + z * visible_from,
+        }
         for x, y, z in random.uniform([-2, -2, 0], [2, 2, 0.9], (12, 3)).tolist()
-    ]  # fmt: skip
+    ]
     first = figures[0].placement
     views.append({"lon_deg": first.lon_deg, "lat_deg": first.lat_deg, "height_m": first.height_m + visible_from / 2})
     views.append({"lon_deg": -170.0, "lat_deg": -40.0, "height_m": 10.0})

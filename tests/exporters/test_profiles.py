@@ -31,6 +31,7 @@ CESIUM = PROFILES["cesiumjs"]
 STEP = HEIGHT / 65535
 """Of a position: the capsule's longest side in 65535 steps."""
 
+# fmt: off
 VARIANTS: dict[str, Asset] = {
     "all": asset(ZURICH, lit=True),
     "vertex colours, no normals": asset(
@@ -43,7 +44,8 @@ VARIANTS: dict[str, Asset] = {
     ),
     "uint32 indices": asset(lods=(capsule(600, 40),)),
     "a kilometre": asset(lods=(capsule(vertices=capsule().vertices * 1000 + (200, 0, -70)),)),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.fixture

@@ -173,10 +173,13 @@ def annotations() -> Iterator[Input]:
     at = sheets.controls(12)
     places = sheets.lonlat(sheets.swiss(at))
     for transformation in (
-        {"type": "polynomial", "options": {"order": 1}}, {"type": "polynomial", "options": {"order": 2}},
-        {"type": "polynomial", "options": {"order": 3}}, {"type": "thinPlateSpline"}, {"type": "projective"},
+        {"type": "polynomial", "options": {"order": 1}},
+        {"type": "polynomial", "options": {"order": 2}},
+        {"type": "polynomial", "options": {"order": 3}},
+        {"type": "thinPlateSpline"},
+        {"type": "projective"},
         {"type": "helmert"},
-    ):  # fmt: skip
+    ):
         made = sheets.annotation(at, places, transformation=transformation)
         yield alone(".json", json.dumps(made).encode())
     crs = {"definition": "+proj=lcc +lat_0=47 +lon_0=8 +lat_1=46 +lat_2=48"}

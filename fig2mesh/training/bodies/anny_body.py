@@ -17,12 +17,14 @@ from fig2mesh.errors import InputError
 from fig2mesh.records import JOINT_NAMES, PART, _Checked
 from fig2mesh.training.bodies.rig import KEYS, Rig
 
+# fmt: off
 KEY_BONES = {
     "hips": "root", "spine1": "spine04", "spine2": "spine03", "spine3": "spine02", "neck": "neck01", "head": "head",
     **{f"{s.lower()}_{key}": f"{bone}.{s}" for s in "LR" for key, bone in (
         ("clavicle", "clavicle"), ("upper_arm", "upperarm01"), ("lower_arm", "lowerarm01"), ("hand", "wrist"),
         ("upper_leg", "upperleg01"), ("lower_leg", "lowerleg01"), ("foot", "foot"))},
-}  # fmt: skip
+}
+# fmt: on
 """Key → anny bone (rig "makehuman")."""
 
 FINGER = re.compile(r"finger[1-5]-[123]\.[LR]")
@@ -193,9 +195,13 @@ def face_parts(
 ) -> NDArray[np.uint8]:
     """(F,) part label of each face: the heaviest part of each vertex, the majority of a face's (paper §3)."""
     part_of = {
-        key: PART["torso"] if key in ("hips", "spine1", "spine2", "spine3") or key.endswith("clavicle")
-        else PART["head"] if key in ("neck", "head") else PART[key] for key in KEYS
-    }  # fmt: skip
+        key: PART["torso"]
+        if key in ("hips", "spine1", "spine2", "spine3") or key.endswith("clavicle")
+        else PART["head"]
+        if key in ("neck", "head")
+        else PART[key]
+        for key in KEYS
+    }
     by_bone = {int(bone): part_of[key] for bone, key in zip(key_bone, KEYS, strict=True)}
     bone_part = np.zeros(len(parents), np.int64)
     for bone, parent in enumerate(parents):
@@ -248,19 +254,30 @@ def _joints(
         knuckles = np.mean([bone[f"finger{k}-1.{s}"] for k in (2, 3, 4, 5)], axis=0)
         side = s.lower()
         found |= {
-            f"{side}_shoulder": bone[f"upperarm01.{s}"], f"{side}_elbow": bone[f"lowerarm01.{s}"],
-            f"{side}_wrist": bone[f"wrist.{s}"], f"{side}_hand": 0.35 * bone[f"wrist.{s}"] + 0.65 * knuckles,
-            f"{side}_hip": bone[f"upperleg01.{s}"], f"{side}_knee": bone[f"lowerleg01.{s}"],
+            f"{side}_shoulder": bone[f"upperarm01.{s}"],
+            f"{side}_elbow": bone[f"lowerarm01.{s}"],
+            f"{side}_wrist": bone[f"wrist.{s}"],
+            f"{side}_hand": 0.35 * bone[f"wrist.{s}"] + 0.65 * knuckles,
+            f"{side}_hip": bone[f"upperleg01.{s}"],
+            f"{side}_knee": bone[f"lowerleg01.{s}"],
             f"{side}_ankle": bone[f"foot.{s}"],
             f"{side}_foot": np.mean([bone[f"toe{k}-1.{s}"] for k in (1, 2, 3, 4, 5)], axis=0),
-        }  # fmt: skip
+        }
     return np.stack([found[name] for name in JOINT_NAMES])
 
 
 def _joint_bones(key_bone: NDArray[np.int32]) -> NDArray[np.int32]:
     rides = {"head": "head", "eyes": "head", "neck": "neck", "thorax": "spine3", "pelvis": "hips"}
-    limb = {"shoulder": "upper_arm", "elbow": "lower_arm", "wrist": "hand", "hand": "hand",
-            "hip": "upper_leg", "knee": "lower_leg", "ankle": "foot", "foot": "foot"}  # fmt: skip
+    limb = {
+        "shoulder": "upper_arm",
+        "elbow": "lower_arm",
+        "wrist": "hand",
+        "hand": "hand",
+        "hip": "upper_leg",
+        "knee": "lower_leg",
+        "ankle": "foot",
+        "foot": "foot",
+    }
     keys = [rides.get(name) or f"{name[0]}_{limb[name[2:]]}" for name in JOINT_NAMES]
     return np.array([key_bone[KEYS.index(key)] for key in keys], np.int32)
 

@@ -16,16 +16,20 @@ from numpy.typing import NDArray
 from fig2mesh.training.bodies.retarget import Rotations, about, swings
 from fig2mesh.training.bodies.rig import KEY, KEYS, T_POSE
 
+# fmt: off
 _CHANNELS: tuple[tuple[str, int, str], ...] = (
     ("hips", 4, ""), ("spine3", 4, "hips"), ("neck", 4, "spine3"),
     ("r_upper_leg", 4, "hips"), ("r_lower_leg", 1, "r_upper_leg"), ("r_foot", 4, "r_lower_leg"),
     ("r_upper_arm", 4, "spine3"), ("r_lower_arm", 1, "r_upper_arm"),
     ("l_upper_leg", 4, "hips"), ("l_lower_leg", 1, "l_upper_leg"), ("l_foot", 4, "l_lower_leg"),
     ("l_upper_arm", 4, "spine3"), ("l_lower_arm", 1, "l_upper_arm"),
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 _FOLLOWS = {
     "head": "neck", "l_clavicle": "spine3", "r_clavicle": "spine3", "l_hand": "l_lower_arm", "r_hand": "r_lower_arm",
-}  # fmt: skip
+}
+# fmt: on
 _HINGE = np.array([[0.0, 0.0, 1.0]])
 _BODY_AXES = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
@@ -71,7 +75,9 @@ def _matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
 def _halfway(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N, 3, 3) rotations half way between two that are less than half a turn apart."""
     between = np.swapaxes(first, -1, -2) @ second
-    axis = np.stack([between[:, 2, 1] - between[:, 1, 2], between[:, 0, 2] - between[:, 2, 0],
-                     between[:, 1, 0] - between[:, 0, 1]], -1)  # fmt: skip
+    axis = np.stack(
+        [between[:, 2, 1] - between[:, 1, 2], between[:, 0, 2] - between[:, 2, 0], between[:, 1, 0] - between[:, 0, 1]],
+        -1,
+    )
     angle = np.arctan2(np.linalg.norm(axis, axis=1), np.trace(between, axis1=1, axis2=2) - 1)
     return np.asarray(first @ about(axis, angle / 2))

@@ -36,10 +36,17 @@ def draw_proportions(rng: np.random.Generator, share: float = 0.55) -> Proportio
     if rng.random() > share:
         return Proportions()
     return Proportions(
-        head=spread(0.8, 2.0), hand=spread(0.7, 1.7), foot=spread(0.7, 1.7), arm_length=spread(0.75, 1.3),
-        leg_length=spread(0.6, 1.3), arm_girth=spread(0.6, 1.6), leg_girth=spread(0.65, 1.6),
-        torso_width=spread(0.8, 1.4), torso_height=spread(0.75, 1.25), torso_depth=spread(0.8, 1.4),
-    )  # fmt: skip
+        head=spread(0.8, 2.0),
+        hand=spread(0.7, 1.7),
+        foot=spread(0.7, 1.7),
+        arm_length=spread(0.75, 1.3),
+        leg_length=spread(0.6, 1.3),
+        arm_girth=spread(0.6, 1.6),
+        leg_girth=spread(0.65, 1.6),
+        torso_width=spread(0.8, 1.4),
+        torso_height=spread(0.75, 1.25),
+        torso_depth=spread(0.8, 1.4),
+    )
 
 
 def caricature(rig: Rig, change: Proportions) -> tuple[Rig, Posture]:

@@ -27,12 +27,14 @@ from fig2mesh.training.bodies.solidify import Surface, solidify
 HEIGHT = 1.79
 """Height of every character, hat and hair included, FIGURE units."""
 
+# fmt: off
 BONES: dict[str, str] = {
     "hips": "Hips", "spine1": "Abdomen", "spine2": "Torso", "spine3": "Chest", "neck": "Neck", "head": "Head",
     **{f"{side.lower()}_{key}": f"{bone}.{side}" for side in "LR" for key, bone in (
         ("clavicle", "Shoulder"), ("upper_arm", "UpperArm"), ("lower_arm", "LowerArm"), ("hand", "Hand"),
         ("upper_leg", "UpperLeg"), ("lower_leg", "LowerLeg"), ("foot", "Foot"))},
-}  # fmt: skip
+}
+# fmt: on
 """Key → name of the bone in the files."""
 
 DIGIT = re.compile(r"(Index|Middle|Ring|Pinky|Thumb)\d\.[LR]")
@@ -41,10 +43,12 @@ BROW_TRIANGLES = 40
 EYE_TRIANGLES = (24, 64)
 """Sizes of the eyes, and of eyes and brows in one, that all these heads share."""
 
+# fmt: off
 DYED = frozenset({
     ("Punk", "Red"), ("Punk", "Red_Dark"), ("Punk", "Pink"), ("Formal", "Red"), ("Medieval", "White"),
     ("SciFi", "Blue"), ("Worker", "DarkBrown"),
-})  # fmt: skip
+})
+# fmt: on
 """Piece and material of hair whose material is named after its colour."""
 
 ANKLE = 0.061
@@ -136,9 +140,15 @@ def read_soup(path: Path) -> Soup:
     linear = np.array(list(found.values()))
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return Soup(
-        shape[real] * scale, np.concatenate(weights)[real], np.concatenate(material)[real],
-        tuple(kind for kind, _ in found), srgb.astype(np.float32), names, parents, heads * scale,
-    )  # fmt: skip
+        shape[real] * scale,
+        np.concatenate(weights)[real],
+        np.concatenate(material)[real],
+        tuple(kind for kind, _ in found),
+        srgb.astype(np.float32),
+        names,
+        parents,
+        heads * scale,
+    )
 
 
 def _skeleton(scene: GltfScene, path: Path) -> tuple[tuple[str, ...], NDArray[np.int32], NDArray[np.int64]]:
@@ -204,16 +214,22 @@ def bind(name: str, mesh: Mesh, soup: Soup, visible: NDArray[np.bool_]) -> Rig:
     joints = _joints(soup, bones)
     face_material = soup.material[seen[surface.nearest(mesh.vertices[mesh.faces].mean(axis=1))[0]]]
     return Rig(
-        name=name, vertices=mesh.vertices, faces=mesh.faces,
-        face_part=_parts(weights, mesh.faces, soup, bones), face_material=face_material.astype(np.uint8),
-        materials=soup.materials, bone_index=strongest.astype(np.int32),
-        bone_weight=(kept / kept.sum(axis=1, keepdims=True)).astype(np.float32), parents=soup.parents,
-        heads=heads.astype(np.float32), key_bone=key_bone.astype(np.int32),
+        name=name,
+        vertices=mesh.vertices,
+        faces=mesh.faces,
+        face_part=_parts(weights, mesh.faces, soup, bones),
+        face_material=face_material.astype(np.uint8),
+        materials=soup.materials,
+        bone_index=strongest.astype(np.int32),
+        bone_weight=(kept / kept.sum(axis=1, keepdims=True)).astype(np.float32),
+        parents=soup.parents,
+        heads=heads.astype(np.float32),
+        key_bone=key_bone.astype(np.int32),
         rest_direction=_directions(heads, bones).astype(np.float32),
         finger_axis=_finger_axes(soup, bones).astype(np.float32),
         joint_bone=np.array([bones[joints[joint][0]] for joint in JOINT_NAMES], np.int32),
         joint_rest=np.array([joints[joint][1] for joint in JOINT_NAMES], np.float32),
-    )  # fmt: skip
+    )
 
 
 def _smoothed(weights: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -319,8 +335,13 @@ def _joints(soup: Soup, bones: dict[str, int]) -> dict[str, tuple[str, NDArray[n
     forward = np.array([0, 0, 0.3 * (high[1] - low[1])])
     joints["eyes"] = ("head", (eyes.min(axis=0) + eyes.max(axis=0)) / 2 if len(eyes) else joints["head"][1] + forward)
     for side in "lr":
-        for joint, key in (("shoulder", "upper_arm"), ("elbow", "lower_arm"), ("wrist", "hand"), ("hip", "upper_leg"),
-                           ("knee", "lower_leg")):  # fmt: skip
+        for joint, key in (
+            ("shoulder", "upper_arm"),
+            ("elbow", "lower_arm"),
+            ("wrist", "hand"),
+            ("hip", "upper_leg"),
+            ("knee", "lower_leg"),
+        ):
             joints[f"{side}_{joint}"] = (f"{side}_{key}", at[f"{side}_{key}"])
         middle = next(b for b, n in enumerate(soup.names) if re.fullmatch(rf"Middle\d\.{side.upper()}", n))
         joints[f"{side}_hand"] = (f"{side}_hand", 0.4 * at[f"{side}_hand"] + 0.6 * soup.heads[middle])

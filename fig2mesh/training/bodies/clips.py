@@ -60,6 +60,7 @@ def _bones(trunk: str, limbs: str) -> dict[str, str]:
     return result
 
 
+# fmt: off
 BONES: tuple[dict[str, str], ...] = (
     _bones("DEF-hips DEF-spine.001 DEF-spine.002 DEF-spine.003 DEF-neck DEF-head",
            "DEF-shoulder.@L DEF-upper_arm.@L DEF-forearm.@L DEF-hand.@L DEF-thigh.@L DEF-shin.@L DEF-foot.@L"),
@@ -77,7 +78,8 @@ BONES: tuple[dict[str, str], ...] = (
            "@LeftShoulder @LeftArm @LeftForeArm @LeftHand @LeftUpLeg @LeftLeg @LeftFoot"),
     _bones("Hips lowerback Chest Chest2 Neck Head",
            "@LeftCollar @LeftShoulder @LeftElbow @LeftWrist @LeftHip @LeftKnee @LeftAnkle"),
-)  # fmt: skip
+)
+# fmt: on
 """Skeletons that are read; a file uses the first whose bones it all has."""
 
 

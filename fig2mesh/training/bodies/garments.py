@@ -74,9 +74,14 @@ def read_garments(bodies: AnnyBodies, assets: Path | None) -> tuple[Garment, ...
     found = []
     for path in sorted(folder.glob("clothes/*/*.mhclo")) + sorted(folder.glob("hair/*/*.mhclo")):
         kind = (
-            "hair" if path.parents[1].name == "hair" else "shoe" if path.stem.startswith("shoes")
-            else "hat" if path.stem.startswith("fedora") else "cloth"
-        )  # fmt: skip
+            "hair"
+            if path.parents[1].name == "hair"
+            else "shoe"
+            if path.stem.startswith("shoes")
+            else "hat"
+            if path.stem.startswith("fedora")
+            else "cloth"
+        )
         surface = _fit(bodies, path)
         if surface is not None:
             found.append(_as_offsets(bodies, path.stem, kind, *surface))
@@ -128,10 +133,11 @@ def _as_offsets(
     scene.add_triangles(surface.astype(np.float32), faces.astype(np.uint32))
     part = _vertex_parts(bodies)
     allowed = {
-        "cloth": ~np.isin(part, [PART["head"], PART["l_hand"], PART["r_hand"]]), "hair": part == PART["head"],
+        "cloth": ~np.isin(part, [PART["head"], PART["l_hand"], PART["r_hand"]]),
+        "hair": part == PART["head"],
         "hat": part == PART["head"],
         "shoe": np.isin(part, [PART[f"{s}_{p}"] for s in "lr" for p in ("foot", "lower_leg")]),
-    }[kind]  # fmt: skip
+    }[kind]
     vertices = bare
     if kind in ("hair", "hat"):
         allowed &= ~_face_region(bodies)
@@ -187,10 +193,12 @@ def _made(bodies: AnnyBodies) -> tuple[Garment, ...]:
     shin = np.isin(part, [PART["l_lower_leg"], PART["r_lower_leg"]])
     waist = vertices[:, 1] > 0.95
     made = {
-        "made-shirt": (torso & waist | upper, 0.010), "made-jumper": (torso & waist | upper | lower, 0.022),
-        "made-shorts": (torso & ~waist | thigh, 0.020), "made-trousers": (torso & ~waist | thigh | shin, 0.016),
+        "made-shirt": (torso & waist | upper, 0.010),
+        "made-jumper": (torso & waist | upper | lower, 0.022),
+        "made-shorts": (torso & ~waist | thigh, 0.020),
+        "made-trousers": (torso & ~waist | thigh | shin, 0.016),
         "made-coat": (torso | upper | lower | thigh, 0.030),
-    }  # fmt: skip
+    }
     garments = []
     for name, (covered, thickness) in made.items():
         along = _smooth(np.where(covered, thickness, 0.0), bodies.rig.faces, covered, 5)

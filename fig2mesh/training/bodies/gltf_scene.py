@@ -134,11 +134,13 @@ def read_gltf(path: Path) -> GltfScene:
 def quaternion_matrix(quaternion: NDArray[np.floating]) -> NDArray[np.float64]:
     """(3, 3) rotation of a quaternion x, y, z, w of any length but zero."""
     x, y, z, w = np.asarray(quaternion, np.float64) / np.linalg.norm(quaternion)
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _sample(path: str, times: NDArray[np.float64], values: NDArray[np.float64], now: float) -> NDArray[np.float64]:

@@ -21,9 +21,11 @@ from fig2mesh.training.bodies.rig import PoseSet, Rig
 HELD_OUT_SHARE = 0.22
 """Share of characters and of outfits that training never sees."""
 
+# fmt: off
 HALF = (
     "vertices", "shapes", "skirt", "skirt_shapes", "uv", "offset", "bone_weight", "skirt_weight", "rotations", "curl",
-)  # fmt: skip
+)
+# fmt: on
 """Fields that are kept in half precision: half a millimetre on a body."""
 
 

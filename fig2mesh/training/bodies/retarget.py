@@ -16,26 +16,33 @@ LIMB_END: dict[str, str] = {
     f"{side}_{limb}": f"{side}_{end}"
     for side in "lr"
     for limb, end in (
-        ("upper_arm", "lower_arm"), ("lower_arm", "hand"), ("upper_leg", "lower_leg"), ("lower_leg", "foot"),
+        ("upper_arm", "lower_arm"),
+        ("lower_arm", "hand"),
+        ("upper_leg", "lower_leg"),
+        ("lower_leg", "foot"),
     )
-}  # fmt: skip
+}
 """Limb → the key whose bone starts where the limb ends."""
 
+# fmt: off
 TWIST_LIMIT_DEG: dict[str, tuple[str, float]] = {
     "upper_arm": ("clavicle", 80), "lower_arm": ("upper_arm", 45), "hand": ("lower_arm", 80),
     "upper_leg": ("hips", 60), "lower_leg": ("upper_leg", 30),
-}  # fmt: skip
+}
+# fmt: on
 """Limb → the key it turns against about its own axis, and how far skin lets it."""
 
 LOOK_LIMIT_DEG = 35.0
 """Angle between the way ahead and the way the head looks; drawn figures seldom show the back of a head."""
 
+# fmt: off
 _SEGMENT: dict[str, tuple[float, float, float]] = {
     "hips": (0, 0.06, 0), "spine1": (0, 0.07, 0), "spine2": (0, 0.07, 0), "spine3": (0, 0.09, 0),
     "neck": (0, 0.05, 0.01), "head": (0, 0.13, 0.01), "clavicle": (0.105, 0, 0), "upper_arm": (0.172, 0, 0),
     "lower_arm": (0.15, 0, 0), "hand": (0.1, 0, 0), "upper_leg": (0, -0.245, 0), "lower_leg": (0, -0.245, 0),
     "foot": (0, -0.035, 0.11),
-}  # fmt: skip
+}
+# fmt: on
 _ATTACH = {"upper_leg": (0.052, -0.005, 0.0), "clavicle": (0.0, -0.02, 0.0)}
 """Where these start, from the start (hips) or the end (spine3) of the key above; all in standing heights."""
 

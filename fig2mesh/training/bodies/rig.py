@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from fig2mesh.records import JOINT_NAMES, _Checked
 
+# fmt: off
 KEYS: tuple[str, ...] = (
     "hips", "spine1", "spine2", "spine3", "neck", "head",
     "l_clavicle", "r_clavicle", "l_upper_arm", "r_upper_arm", "l_lower_arm", "r_lower_arm", "l_hand", "r_hand",
     "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg", "l_foot", "r_foot",
-)  # fmt: skip
+)
+# fmt: on
 """The segments that a pose turns; every rig maps each to one of its bones."""
 
 KEY: dict[str, int] = {name: index for index, name in enumerate(KEYS)}
@@ -27,19 +29,23 @@ KEY: dict[str, int] = {name: index for index, name in enumerate(KEYS)}
 KEY_MIRROR: tuple[int, ...] = tuple(KEY[{"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]] for name in KEYS)
 """Index of the same key on the other side."""
 
+# fmt: off
 KEY_PARENT: dict[str, str] = {
     "spine1": "hips", "spine2": "spine1", "spine3": "spine2", "neck": "spine3", "head": "neck",
     **{f"{s}_{child}": f"{s}_{parent}" for s in "lr" for child, parent in (
         ("upper_arm", "clavicle"), ("lower_arm", "upper_arm"), ("hand", "lower_arm"),
         ("lower_leg", "upper_leg"), ("foot", "lower_leg"))},
     "l_clavicle": "spine3", "r_clavicle": "spine3", "l_upper_leg": "hips", "r_upper_leg": "hips",
-}  # fmt: skip
+}
+# fmt: on
 """Key → the key that it hangs on; "hips" hangs on nothing."""
 
+# fmt: off
 T_POSE: NDArray[np.float64] = np.array([
     [-1.0 if name.startswith("r_") else 1.0, 0, 0] if name.endswith(("arm", "hand")) else
     [0, -1.0, 0] if name.endswith("leg") else [0.0, 0, 0] for name in KEYS
-])  # fmt: skip
+])
+# fmt: on
 """(20, 3) direction of each limb in the canonical T-pose, BODY; zero for keys whose direction is not a limb's."""
 
 

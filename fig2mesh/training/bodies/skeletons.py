@@ -196,9 +196,9 @@ def _reach(rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     key = np.full(len(heads), -1)
     base = np.zeros((len(heads), 3))
     reach = np.zeros((len(heads), len(KEYS), 3))
-    turns = np.stack([
-        swing(rig.rest_direction[k], T_POSE[k]) if T_POSE[k].any() else np.eye(3) for k in range(len(KEYS))
-    ])  # fmt: skip
+    turns = np.stack(
+        [swing(rig.rest_direction[k], T_POSE[k]) if T_POSE[k].any() else np.eye(3) for k in range(len(KEYS))]
+    )
 
     def add(base: NDArray[np.float64], reach: NDArray[np.float64], by: int, offset: NDArray[np.float64]) -> None:
         if by < 0:
@@ -252,6 +252,7 @@ def _about(axis: int, angle: Tensor) -> Tensor:
 
 
 _TRUNK_JOINTS: Final = ("thorax", "pelvis", "neck", "l_shoulder", "r_shoulder", "l_hip", "r_hip")
+# fmt: off
 _CAPSULES: Final = (  # two joints and the usual radius, FIGURE units
     ("thorax", "pelvis", 0.11), ("l_shoulder", "r_shoulder", 0.07), ("l_hip", "r_hip", 0.09),
     ("l_shoulder", "l_hip", 0.07), ("r_shoulder", "r_hip", 0.07), ("neck", "head", 0.09),
@@ -259,15 +260,18 @@ _CAPSULES: Final = (  # two joints and the usual radius, FIGURE units
         ("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("wrist", "hand", 0.04), ("hip", "knee", 0.075),
         ("knee", "ankle", 0.055), ("ankle", "foot", 0.045),
     )),
-)  # fmt: skip
+)
+# fmt: on
 _STARTS: Final = tuple(JOINT[first] for first, _, _ in _CAPSULES)
 _ENDS: Final = tuple(JOINT[second] for _, second, _ in _CAPSULES)
 _RADII: Final = tuple(radius for _, _, radius in _CAPSULES)
+# fmt: off
 _JOINT_RADII: Final = tuple(
     min(radius for first, second, radius in _CAPSULES if name in (first, second))
     if any(name in capsule for capsule in _CAPSULES) else 0.09
     for name in JOINT_NAMES
-)  # fmt: skip
+)
+# fmt: on
 _OWN: Final = tuple(
     tuple(
         name in (first, second)
@@ -280,9 +284,11 @@ _OWN: Final = tuple(
 """(21, capsules) whether a capsule belongs to a joint and so cannot hide it."""
 
 _ONE_SIDE: Final = tuple(KEY["l_" + key[2:]] if key.startswith("r_") else KEY[key] for key in KEYS)
+# fmt: off
 _CHANGE: Final = {  # name ending → least and largest factor
     **dict.fromkeys(LIMBS, (0.6, 1.6)), "neck": (0.6, 1.6), "head": (0.7, 2.2),
-}  # fmt: skip
+}
+# fmt: on
 _TORSO: Final = tuple(KEY[key] for key in KEYS if key not in _CHANGE)
 
 

@@ -29,18 +29,22 @@ _ARMS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], f
 }
 """Way to hold an arm → upper arm, lower arm, spread of both."""
 
+# fmt: off
 _ARM_PAIRS: tuple[tuple[str, str, float], ...] = (
     ("hang", "hang", 3), ("akimbo", "akimbo", 2), ("akimbo", "hang", 1), ("akimbo", "wave", 1), ("raise", "raise", 1.5),
     ("wave", "hang", 2), ("raise", "hang", 1), ("out", "out", 1.5), ("offer", "hang", 1), ("offer", "offer", 1),
     ("point", "hang", 1.5), ("point", "akimbo", 0.7), ("chest", "chest", 0.6), ("chest", "hang", 0.8),
     ("pray", "pray", 0.6), ("salute", "hang", 0.8), ("behind", "behind", 0.7), ("carry", "hang", 1),
     ("carry", "carry", 1), ("out", "hang", 1), ("raise", "akimbo", 0.7), ("carry", "raise", 0.7),
-)  # fmt: skip
+)
+# fmt: on
 
+# fmt: off
 _LEGS: dict[str, float] = {
     "stand": 6, "straddle": 1.5, "relaxed": 2, "walk": 4, "run": 1.5, "chair": 2, "crossed": 1.2, "kneel": 0.8,
     "half_kneel": 1, "kick": 1.5, "dance": 1.2, "squat": 0.6, "lunge": 0.8,
-}  # fmt: skip
+}
+# fmt: on
 
 
 def stances(count: int, rng: np.random.Generator) -> tuple[NDArray[np.str_], Rotations]:
@@ -109,24 +113,31 @@ def _leg(name: str, first: bool, hips: NDArray[np.float64], rng: np.random.Gener
         "stand": (u(-4, 4), u(2, 9), u(5, 25), u(0, 6), True),
         "straddle": (u(-4, 6), u(13, 28), u(10, 35), u(0, 10), True),
         "relaxed": (u(-3, 3), u(2, 6), u(0, 15), u(0, 4), True)
-        if first else (u(10, 25), u(5, 14), u(15, 40), u(18, 42), True),
+        if first
+        else (u(10, 25), u(5, 14), u(15, 40), u(18, 42), True),
         "walk": (u(14, 34), u(1, 5), u(0, 12), u(3, 14), True)
-        if first else (u(-26, -10), u(1, 5), u(0, 12), u(5, 35), False),
+        if first
+        else (u(-26, -10), u(1, 5), u(0, 12), u(5, 35), False),
         "run": (u(40, 75), u(0, 6), u(0, 10), u(50, 100), False)
-        if first else (u(-30, -10), u(0, 6), u(0, 10), u(25, 90), False),
+        if first
+        else (u(-30, -10), u(0, 6), u(0, 10), u(25, 90), False),
         "chair": (u(78, 94), u(4, 18), u(0, 12), u(72, 102), True),
         "crossed": (u(72, 88), u(42, 55), u(68, 80), u(112, 128), False),
         "kneel": (u(-5, 20), u(4, 12), u(0, 10), u(85, 105), False),
         "half_kneel": (u(82, 98), u(5, 16), u(0, 12), u(85, 105), True)
-        if first else (u(-15, 5), u(3, 10), u(0, 8), u(82, 100), False),
+        if first
+        else (u(-15, 5), u(3, 10), u(0, 8), u(82, 100), False),
         "kick": (u(35, 100), u(0, 20), u(0, 15), u(0, 35), False)
-        if first else (u(-5, 12), u(2, 8), u(5, 25), u(2, 18), True),
+        if first
+        else (u(-5, 12), u(2, 8), u(5, 25), u(2, 18), True),
         "dance": (u(25, 75), u(15, 45), u(20, 50), u(50, 120), False)
-        if first else (u(-3, 5), u(2, 8), u(8, 30), u(0, 8), True),
+        if first
+        else (u(-3, 5), u(2, 8), u(8, 30), u(0, 8), True),
         "squat": (u(75, 105), u(12, 30), u(10, 30), u(95, 125), True),
         "lunge": (u(50, 80), u(15, 35), u(10, 25), u(55, 85), True)
-        if first else (u(-25, -8), u(10, 25), u(5, 25), u(0, 15), True),
-    }[name]  # fmt: skip
+        if first
+        else (u(-25, -8), u(10, 25), u(5, 25), u(0, 15), True),
+    }[name]
     yaw = _y(spread) if raised > 60 else _z(spread)  # a thigh that lies level spreads about the vertical
     thigh = hips @ yaw @ _x(-raised) @ _y(turned)
     shin = thigh @ _x(knee)

@@ -9,16 +9,20 @@ from numpy.typing import NDArray
 
 from fig2mesh.training.drawing.marks import LETTERS, Picture, blur, lay, noise, stroke, write
 
+# fmt: off
 BACKGROUNDS: Final = {"white": 0.22, "tint": 0.12, "paper": 0.26, "coast": 0.14, "realms": 0.1, "fields": 0.08,
-                      "town": 0.08}  # fmt: skip
+                      "town": 0.08}
+# fmt: on
 """Kind → how often it is chosen."""
 
 PLAIN: Final = ("white", "tint", "paper")
 """The kinds that are no maps."""
 
 PAPERS: Final = ((250, 247, 238), (244, 234, 212), (236, 220, 188), (226, 205, 165), (238, 236, 230), (222, 214, 200))
+# fmt: off
 TINTS: Final = ((233, 196, 178), (206, 214, 178), (242, 222, 160), (188, 206, 210), (222, 190, 198), (214, 196, 160),
-                (186, 200, 172))  # fmt: skip
+                (186, 200, 172))
+# fmt: on
 SEAS: Final = ((186, 206, 206), (206, 218, 214), (160, 190, 198), (222, 222, 206))
 INKS: Final = ((50, 40, 34), (96, 66, 44), (30, 30, 34), (70, 64, 84))
 ROOFS: Final = ((206, 100, 78), (184, 88, 70), (120, 110, 104), (216, 150, 110))

@@ -14,10 +14,12 @@ from fig2mesh.records import JOINT, PART
 CANVAS: Final = 512
 """Pixels a side of what doodles are drawn on."""
 
+# fmt: off
 BONES: Final = {
     "upper_arm": ("shoulder", "elbow"), "lower_arm": ("elbow", "wrist"), "hand": ("wrist", "hand"),
     "upper_leg": ("hip", "knee"), "lower_leg": ("knee", "ankle"), "foot": ("ankle", "foot"),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @dataclass(frozen=True)
@@ -130,8 +132,14 @@ def _torso(at: NDArray[np.float64], manner: Manner, tall: float, rng: np.random.
             corner = np.stack([pelvis, thorax + across * wide, thorax - across * wide])
         cv2.fillPoly(mask, [np.rint(corner).astype(np.int32)], 255)
     elif manner.torso_shape == "box":
-        corner = np.stack([thorax + across * half, pelvis + across * half * rng.uniform(0.7, 1.2),
-                           pelvis - across * half * rng.uniform(0.7, 1.2), thorax - across * half])  # fmt: skip
+        corner = np.stack(
+            [
+                thorax + across * half,
+                pelvis + across * half * rng.uniform(0.7, 1.2),
+                pelvis - across * half * rng.uniform(0.7, 1.2),
+                thorax - across * half,
+            ]
+        )
         cv2.fillPoly(mask, [np.rint(corner).astype(np.int32)], 255)
     hull = cv2.convexHull(np.rint(np.concatenate([shoulders, hips, thorax[None], pelvis[None]])).astype(np.int32))
     cv2.fillPoly(mask, [hull], 255)

@@ -147,8 +147,10 @@ def _face(sheet: Sheet, joints: NDArray[np.float64], manner: Manner, tall: float
     dot = max(int(radius * rng.uniform(0.06, 0.14)), 1)
     for side in (-1, 1):
         cv2.circle(layer, pixel(eyes + side * across * radius * 0.32), dot, 255, -1 if rng.random() < 0.7 else 1)
-    mouth = [eyes - up * radius * (0.6 - rng.normal(0.0, 0.1) * (x * x - 0.5)) + across * x * radius * 0.35
-             for x in np.linspace(-1, 1, 5)]  # fmt: skip
+    mouth = [
+        eyes - up * radius * (0.6 - rng.normal(0.0, 0.1) * (x * x - 0.5)) + across * x * radius * 0.35
+        for x in np.linspace(-1, 1, 5)
+    ]
     cv2.polylines(layer, [np.rint(np.stack(mouth)).astype(np.int32)], False, 255, max(int(radius * 0.08), 1))
     on = (layer > 0) & (sheet.labels == PART["head"])
     under = sheet.colour[sheet.labels == PART["head"]]
@@ -186,5 +188,4 @@ def _wobbled(
     coarse = rng.normal(0, 1, (2, 24, 24)).astype(np.float32)
     field = [cv2.resize(grid, (CANVAS, CANVAS), interpolation=cv2.INTER_CUBIC) * amount for grid in coarse]
     right, down = x + field[0], y + field[1]
-    return (cv2.remap(rgba, right, down, cv2.INTER_LINEAR),
-            cv2.remap(labels, right, down, cv2.INTER_NEAREST))  # fmt: skip
+    return (cv2.remap(rgba, right, down, cv2.INTER_LINEAR), cv2.remap(labels, right, down, cv2.INTER_NEAREST))

@@ -74,10 +74,14 @@ def _manner(rng: np.random.Generator) -> Manner:
         union=bool(rng.random() < (0.75 if kind == "pictogram" else 0.35)),
         filled=bool(rng.random() < FILLED[kind]),
         solid=bool(rng.random() < ONE_COLOUR[kind]),
-        torso_shape=str(rng.choice(["line", "hull", "ellipse", "triangle", "box"],
-                                   p=[0.5, 0.1, 0.2, 0.1, 0.1] if kind == "stick" else [0.02, 0.5, 0.28, 0.1, 0.1])),
+        torso_shape=str(
+            rng.choice(
+                ["line", "hull", "ellipse", "triangle", "box"],
+                p=[0.5, 0.1, 0.2, 0.1, 0.1] if kind == "stick" else [0.02, 0.5, 0.28, 0.1, 0.1],
+            )
+        ),
         ends=u(0.0, 0.035) if rng.random() < 0.6 else 0.0,
-    )  # fmt: skip
+    )
 
 
 def stance(rng: np.random.Generator) -> NDArray[np.float64]:

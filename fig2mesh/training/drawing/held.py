@@ -40,8 +40,17 @@ def held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> li
             mask |= polygon(shape, np.stack(arc))
         if kind == "tool":
             blade = rng.uniform(0.02, 0.1, 2) * tall
-            mask |= polygon(shape, np.stack([head + across * blade[0], head + across * blade[0] - up * blade[1],
-                                              head - across * blade[0] * rng.uniform(0, 1), head]))  # fmt: skip
+            mask |= polygon(
+                shape,
+                np.stack(
+                    [
+                        head + across * blade[0],
+                        head + across * blade[0] - up * blade[1],
+                        head - across * blade[0] * rng.uniform(0, 1),
+                        head,
+                    ]
+                ),
+            )
     elif kind == "sword":
         way = hand - wrist
         turn = way / max(float(np.linalg.norm(way)), 1e-3) if rng.random() < 0.5 else up
@@ -55,8 +64,12 @@ def held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> li
         low = hand + [0, drop]
         mask = line(shape, np.stack([hand, low + [wide * 0.6, 0]]), thick * 0.7)
         mask |= line(shape, np.stack([hand, low - [wide * 0.6, 0]]), thick * 0.7)
-        mask |= polygon(shape, np.stack([low + [-wide * 0.8, 0], low + [wide * 0.8, 0], low + [wide, wide * 1.4],
-                                          low + [-wide, wide * 1.4]]))  # fmt: skip
+        mask |= polygon(
+            shape,
+            np.stack(
+                [low + [-wide * 0.8, 0], low + [wide * 0.8, 0], low + [wide, wide * 1.4], low + [-wide, wide * 1.4]]
+            ),
+        )
     elif kind == "cup":
         wide, high = rng.uniform(0.02, 0.05) * tall, rng.uniform(0.05, 0.13) * tall
         cup = [

@@ -14,24 +14,34 @@ from fig2mesh.training.drawing.background import BACKGROUNDS, PLAIN
 T = TypeVar("T")
 Fill = Literal["flat", "steps", "soft", "wash", "hatched", "paper"]
 
+# fmt: off
 FILLS: Final[dict[Fill, float]] = {"flat": 0.34, "steps": 0.2, "soft": 0.08, "wash": 0.14, "hatched": 0.1,
-                                   "paper": 0.14}  # fmt: skip
+                                   "paper": 0.14}
+# fmt: on
 """Flat colour, two tones, soft shading, watercolour, engraved shading, bare paper inside the lines."""
 PALETTES: Final = {"map": 0.28, "bright": 0.32, "duo": 0.12, "greys": 0.1, "any": 0.18}
 PATTERNS: Final = {"none": 0.5, "stripes": 0.14, "plaid": 0.1, "dots": 0.1, "checks": 0.06, "hatching": 0.1}
 INKS: Final = {(16, 14, 14): 0.6, (74, 48, 30): 0.2, (26, 32, 74): 0.13, (120, 40, 30): 0.07}
 """Line colours: black, brown, dark blue, rust."""
 
+# fmt: off
 SKINS: Final = ((255, 228, 206), (250, 206, 176), (238, 184, 146), (214, 156, 112), (178, 118, 78), (128, 82, 54),
-                (84, 54, 40))  # fmt: skip
+                (84, 54, 40))
+# fmt: on
 """From light to dark; every colour between two neighbours may occur."""
+# fmt: off
 HAIRS: Final = ((30, 26, 26), (58, 40, 30), (92, 58, 34), (140, 92, 48), (206, 162, 88), (236, 208, 140), (170, 72, 36),
-                (200, 60, 40), (150, 148, 146), (232, 230, 226))  # fmt: skip
+                (200, 60, 40), (150, 148, 146), (232, 230, 226))
+# fmt: on
+# fmt: off
 MAP_TINTS: Final = ((200, 118, 96), (222, 168, 128), (216, 190, 120), (150, 166, 116), (112, 146, 134), (120, 152, 166),
-                    (96, 110, 140), (164, 118, 136), (120, 92, 70), (232, 218, 190), (196, 176, 142))  # fmt: skip
+                    (96, 110, 140), (164, 118, 136), (120, 92, 70), (232, 218, 190), (196, 176, 142))
+# fmt: on
+# fmt: off
 BRIGHTS: Final = ((226, 40, 44), (250, 140, 30), (252, 208, 46), (86, 176, 70), (30, 150, 150), (40, 130, 220),
                   (30, 50, 140), (130, 70, 170), (240, 110, 160), (255, 255, 255), (40, 40, 44),
-                  (140, 220, 230))  # fmt: skip
+                  (140, 220, 230))
+# fmt: on
 
 
 @dataclass(frozen=True)

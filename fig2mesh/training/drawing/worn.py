@@ -62,8 +62,9 @@ def put_on(layers: Layers, materials: list[str], worn: list[Thing]) -> tuple[Lay
 def _bulge(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """(H, W, 3) normals of a shape that is round at its rim."""
     away = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 4)
-    normal = np.stack([-cv2.Sobel(away, cv2.CV_32F, 1, 0), cv2.Sobel(away, cv2.CV_32F, 0, 1), np.full(mask.shape, 0.3)],
-                      axis=-1)  # fmt: skip
+    normal = np.stack(
+        [-cv2.Sobel(away, cv2.CV_32F, 1, 0), cv2.Sobel(away, cv2.CV_32F, 0, 1), np.full(mask.shape, 0.3)], axis=-1
+    )
     return np.asarray(normal / np.linalg.norm(normal, axis=-1, keepdims=True), np.float32)
 
 
@@ -92,8 +93,10 @@ def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
         right += rng.uniform(0.05, 0.3) * tall
     reach = float(((low - pelvis) @ down).max())
     wide = float(np.abs((hips - pelvis) @ across).max()) + waist
-    hem = [pelvis + across * (left + (right - left) * t) + down * (reach + rng.normal(0, 0.012) * tall)
-           for t in np.linspace(0, 1, 6)]  # fmt: skip
+    hem = [
+        pelvis + across * (left + (right - left) * t) + down * (reach + rng.normal(0, 0.012) * tall)
+        for t in np.linspace(0, 1, 6)
+    ]
     outline = np.stack(
         [top - across * waist, pelvis - across * wide, *hem, pelvis + across * wide, top + across * waist]
     )
@@ -132,8 +135,13 @@ def _hair(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
     if kind in ("long", "bob"):
         length, wide = (rng.uniform(1.2, 2.6) if kind == "long" else rng.uniform(0.4, 0.9)), rng.uniform(0.75, 1.3)
         aside, fall = across * wide * size, up * length * size
-        lock = [head + up * size, head + 0.9 * aside + up * 0.5 * size, head + aside - fall, head - aside - fall,
-                head - 0.9 * aside + up * 0.5 * size]  # fmt: skip
+        lock = [
+            head + up * size,
+            head + 0.9 * aside + up * 0.5 * size,
+            head + aside - fall,
+            head - aside - fall,
+            head - 0.9 * aside + up * 0.5 * size,
+        ]
         mask = polygon(shape, smooth(np.stack(lock)))
         return [Thing(mask, PART["hair"], "hair", bool(averted))]
     if kind == "bun":

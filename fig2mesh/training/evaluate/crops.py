@@ -38,8 +38,10 @@ def evaluate_crops(data: Path, count: int, blazepose: Path | None, say: Callable
 
     cv2.setNumThreads(1)
     other = None if blazepose is None else _blazepose(blazepose)
-    lines = ["| held-out drawings | by | silhouette IoU | parts IoU | PCK@0.05 | PCK@0.1 | sides |",
-             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    lines = [
+        "| held-out drawings | by | silhouette IoU | parts IoU | PCK@0.05 | PCK@0.1 | sides |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for title, split, kind in SETS:
         viewer = Viewer(load_crops(data, split, kind, most=1), 1, grounds=60, size=SIZE)
         rng = np.random.default_rng(17)
@@ -57,8 +59,10 @@ def evaluate_crops(data: Path, count: int, blazepose: Path | None, say: Callable
         say(f"{title}: {len(found['fig2mesh'])} crops")
         for name, scores in found.items():
             if scores:
-                cells = [np.mean([s[key] for s in scores if key in s]) if any(key in s for s in scores) else None
-                         for key in ("iou", "parts", "pck05", "pck10", "sides")]  # fmt: skip
+                cells = [
+                    np.mean([s[key] for s in scores if key in s]) if any(key in s for s in scores) else None
+                    for key in ("iou", "parts", "pck05", "pck10", "sides")
+                ]
                 shown = " | ".join("" if value is None else f"{value:.3f}" for value in cells)
                 lines.append(f"| {title} | {name} | {shown} |")
     return "\n".join(lines) + "\n\n"
@@ -73,8 +77,11 @@ def _scores(view: View, mask: BoolArray, found: Inference | None) -> Row:
     if own is not None:
         row |= {"pck05": own.pck05, "pck10": own.pck10, "sides": own.sides}
     if found.part_labels.any():
-        each = [_iou(found.part_labels == part, view.labels == part) for part in range(1, len(PART_NAMES))
-                if (view.labels == part).sum() > 20]  # fmt: skip
+        each = [
+            _iou(found.part_labels == part, view.labels == part)
+            for part in range(1, len(PART_NAMES))
+            if (view.labels == part).sum() > 20
+        ]
         row["parts"] = float(np.mean(each))
     return row
 

@@ -214,13 +214,16 @@ def _figure_table(pack: Pack, figures: int) -> str:
         found = [measure_roads(pack, split, seed) for seed in range(figures)]
         for road in (*ROADS, *(GIVEN + road for road in ROADS)):
             results = [one[road] for one in found]
-            rows.append((
-                f"{SPLIT_TITLE[split]}: {road}", _spread([1000 * r.likeness.chamfer for r in results], ".1f"),
-                f"{1000 * float(np.median([r.likeness.chamfer for r in results])):.1f}",
-                f"{float(np.mean([r.likeness.normals for r in results])):.3f}",
-                f"{100 * float(np.mean([r.likeness.side_iou for r in results])):.1f}",
-                f"{100 * float(np.mean([np.mean(list(r.ious.values())) for r in results])):.1f}",
-            ))  # fmt: skip
+            rows.append(
+                (
+                    f"{SPLIT_TITLE[split]}: {road}",
+                    _spread([1000 * r.likeness.chamfer for r in results], ".1f"),
+                    f"{1000 * float(np.median([r.likeness.chamfer for r in results])):.1f}",
+                    f"{float(np.mean([r.likeness.normals for r in results])):.3f}",
+                    f"{100 * float(np.mean([r.likeness.side_iou for r in results])):.1f}",
+                    f"{100 * float(np.mean([np.mean(list(r.ious.values())) for r in results])):.1f}",
+                )
+            )
             by_kind: dict[str, list[float]] = {kind: [] for kind in KINDS}
             for result in results:
                 for part in BODY_PARTS:

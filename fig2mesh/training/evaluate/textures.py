@@ -33,13 +33,17 @@ from fig2mesh.training.samples.textured_subject import Subject, subjects
 Picture = NDArray[np.float32]
 Say = Callable[[str], None]
 
+# fmt: off
 BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
     "as the main job bakes them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
     "coordinates, refined", "coordinates",
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 STRAIGHT, NEAREST, INPAINTED = (
     "straight through the body", "nearest seen point", "OpenCV inpainting in texture space",
-)  # fmt: skip
+)
+# fmt: on
 ROADS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
 """Ways to make unseen sides; the last three are baselines."""
 

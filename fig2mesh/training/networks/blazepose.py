@@ -21,12 +21,14 @@ from fig2mesh.records import JOINT
 REMEDY = "give pose_landmark_full.tflite of the package @mediapipe/pose 0.5"
 
 
+# fmt: off
 LANDMARKS: Final = {
     "head": (7, 8), "eyes": (2, 5), "neck": (9, 10, 11, 12), "thorax": (11, 12), "pelvis": (23, 24),
     **{f"{side}_{name}": (first + (side == "r"),) for side in "lr" for name, first in (
         ("shoulder", 11), ("elbow", 13), ("wrist", 15), ("hand", 19), ("hip", 23), ("knee", 25), ("ankle", 27),
         ("foot", 31))},
-}  # fmt: skip
+}
+# fmt: on
 """Joint → BlazePose's landmarks whose mean it is: ears, eyes, mouth, and those of its own name."""
 
 

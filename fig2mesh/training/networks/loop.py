@@ -126,9 +126,17 @@ def run_loop(
     mixed = device.type == "cuda" if amp is None else amp
     rates = [float(group.setdefault("initial_lr", group["lr"])) for group in optimizer.param_groups]
     identity: dict[str, Argument] = {
-        "seed": seed, "steps": steps, "budget_min": budget_min, "batch": batch, "warmup": warmup, "ema": ema,
-        "clip": clip, "amp": mixed, "learning_rate": rates[0], **(arguments or {}),
-    }  # fmt: skip
+        "seed": seed,
+        "steps": steps,
+        "budget_min": budget_min,
+        "batch": batch,
+        "warmup": warmup,
+        "ema": ema,
+        "clip": clip,
+        "amp": mixed,
+        "learning_rate": rates[0],
+        **(arguments or {}),
+    }
     folder.mkdir(parents=True, exist_ok=True)
     state = _State(torch.Generator().manual_seed(seed), _copy(model))
     _resume(folder, identity, model, optimizer, state)
@@ -265,8 +273,10 @@ def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
         return
     every = dict.fromkeys(name for row in rows for name in row)
     names = [name for name in every if name not in ("step", "seconds", "samples", "rate")]
-    pairs = {name.removeprefix("valid_"): [n for n in names if n.removeprefix("valid_") == name.removeprefix("valid_")]
-             for name in names}  # fmt: skip
+    pairs = {
+        name.removeprefix("valid_"): [n for n in names if n.removeprefix("valid_") == name.removeprefix("valid_")]
+        for name in names
+    }
     figure = Figure(figsize=(5, 2.2 * len(pairs)), layout="constrained")
     for index, (title, shown) in enumerate(pairs.items()):
         axes = figure.add_subplot(len(pairs), 1, index + 1)
@@ -288,11 +298,18 @@ def _save(
     state: _State,
 ) -> None:
     content: dict[str, Any] = {
-        "arguments": identity, "model": model.state_dict(), "averaged": state.averaged,
-        "optimizer": optimizer.state_dict(), "generator": state.generator.get_state(), "step": state.step,
-        "seconds": state.seconds, "progress": state.progress, "rows": state.rows, "sums": state.sums,
+        "arguments": identity,
+        "model": model.state_dict(),
+        "averaged": state.averaged,
+        "optimizer": optimizer.state_dict(),
+        "generator": state.generator.get_state(),
+        "step": state.step,
+        "seconds": state.seconds,
+        "progress": state.progress,
+        "rows": state.rows,
+        "sums": state.sums,
         "summed": state.summed,
-    }  # fmt: skip
+    }
     part = folder / (CHECKPOINT + ".part")
     torch.save(content, part)
     os.replace(part, folder / CHECKPOINT)

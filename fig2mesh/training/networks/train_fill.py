@@ -77,15 +77,36 @@ def train_fill(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=100, clip=1.0, device=device, amp=amp, validations=6,
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=100,
+        clip=1.0,
+        device=device,
+        amp=amp,
+        validations=6,
         arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
-    )  # fmt: skip
-    found = {f"{split}_{name}": value for split, bodies in held.items()
-             for name, value in scores(net, bodies, device).items()}  # fmt: skip
+    )
+    found = {
+        f"{split}_{name}": value
+        for split, bodies in held.items()
+        for name, value in scores(net, bodies, device).items()
+    }
     write_scores(out, found)
-    facts = {"data": recipe_digest(data), "bodies": len(known), "seed": seed, "steps": result.steps,
-             "samples": result.samples, "scores": found}  # fmt: skip
+    facts = {
+        "data": recipe_digest(data),
+        "bodies": len(known),
+        "seed": seed,
+        "steps": result.steps,
+        "samples": result.samples,
+        "scores": found,
+    }
     save_fill(fill_path(out), net, facts)
     return found
 

@@ -83,8 +83,13 @@ def train_parse(
         net.load_state_dict(read_parser(parser_path(init))[0].state_dict())
         net.requires_grad_(True)
     if not whole:
-        for early in (net.encoder.stem, net.encoder.stem_filter, net.encoder.stem_narrow, net.encoder.stage64,
-                      net.encoder.stage32):  # fmt: skip
+        for early in (
+            net.encoder.stem,
+            net.encoder.stem_filter,
+            net.encoder.stem_narrow,
+            net.encoder.stage64,
+            net.encoder.stage32,
+        ):
             early.requires_grad_(False)
         for module in net.encoder.modules():
             if isinstance(module, Depthwise):
@@ -111,19 +116,47 @@ def train_parse(
     encoder = [parameter for parameter in net.encoder.parameters() if parameter.requires_grad]
     known = {id(parameter) for parameter in encoder}
     optimizer = torch.optim.AdamW(
-        [{"params": [p for p in net.parameters() if p.requires_grad and id(p) not in known], "lr": rate},
-         {"params": encoder, "lr": rate * ENCODER_RATE}], weight_decay=0.01,
-    )  # fmt: skip
-    facts: dict[str, Any] = {"data": crops_digest(data), "crops": len(viewer.crops), "seed": seed,
-                             "start": None if blazepose is None else "BlazePose full (Apache-2.0)"}  # fmt: skip
+        [
+            {"params": [p for p in net.parameters() if p.requires_grad and id(p) not in known], "lr": rate},
+            {"params": encoder, "lr": rate * ENCODER_RATE},
+        ],
+        weight_decay=0.01,
+    )
+    facts: dict[str, Any] = {
+        "data": crops_digest(data),
+        "crops": len(viewer.crops),
+        "seed": seed,
+        "start": None if blazepose is None else "BlazePose full (Apache-2.0)",
+    }
     result = run_loop(
-        model=net, optimizer=optimizer, step=step, folder=out, validate=validate, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=60, ema=0.998, clip=1.0, amp=True, validations=12,
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        folder=out,
+        validate=validate,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=60,
+        ema=0.998,
+        clip=1.0,
+        amp=True,
+        validations=12,
         arguments={"data": facts["data"], "init": None if init is None else init.name, "whole": whole},
-    )  # fmt: skip
+    )
     scores = dict(validate())
-    save_parser(parser_path(out), net, {**facts, "steps": result.steps, "samples": result.samples,
-                                        "minutes": round(result.seconds / 60, 1), "scores": scores})  # fmt: skip
+    save_parser(
+        parser_path(out),
+        net,
+        {
+            **facts,
+            "steps": result.steps,
+            "samples": result.samples,
+            "minutes": round(result.seconds / 60, 1),
+            "scores": scores,
+        },
+    )
     write_scores(out, scores)
     return scores
 
@@ -156,8 +189,13 @@ def losses(found: Parsed, target: Mapping[str, Tensor]) -> dict[str, Tensor]:
     joints = -(wanted * found.heat.flatten(2).log_softmax(dim=2)).sum(dim=2)
     joint = (joints * weight).sum() / weight.sum().clamp_min(1)
     seen = functional.binary_cross_entropy_with_logits(found.visible, target["visible"].float())
-    return {"loss": 2.0 * silhouette + labels + 0.5 * joint + 0.2 * seen, "silhouette": silhouette, "labels": labels,
-            "joints": joint, "visible": seen}  # fmt: skip
+    return {
+        "loss": 2.0 * silhouette + labels + 0.5 * joint + 0.2 * seen,
+        "silhouette": silhouette,
+        "labels": labels,
+        "joints": joint,
+        "visible": seen,
+    }
 
 
 def heat_targets(joints: Tensor) -> Tensor:

@@ -87,23 +87,42 @@ def train_parts(
 
     steps = None if epochs is None else -(-epochs * VIEWS * len(train) // batch)
     result = run_loop(
-        model=net, optimizer=optimizer, step=step, folder=out, validate=validate, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, ema=ema, clip=1.0, device=device, amp=True,
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        folder=out,
+        validate=validate,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        ema=ema,
+        clip=1.0,
+        device=device,
+        amp=True,
         arguments={
-            "kind": kind, "variant": shape.variant, "points": points, "parts": len(train),
-            "data": recipe_digest(data), "jitter": jitter,
-            "mask_mix": " ".join(map(str, mask_mix)), "init_samples": before.get("samples", 0),
+            "kind": kind,
+            "variant": shape.variant,
+            "points": points,
+            "parts": len(train),
+            "data": recipe_digest(data),
+            "jitter": jitter,
+            "mask_mix": " ".join(map(str, mask_mix)),
+            "init_samples": before.get("samples", 0),
         },
-    )  # fmt: skip
+    )
     scores: dict[str, float] = {}
     if held_out:
         for which in ("visible", "amodal"):
             found = evaluate_parts(net, data, "valid", which, validation_bodies, one_view=True, dense=False)
             scores |= {f"{name}_{which}": value for name, value in found.items()}
     facts = {
-        "data": {"parts": len(train), "name": data.name}, "seed": seed, "steps": result.steps,
-        "samples": before.get("samples", 0) + result.samples, "scores": scores,
-    }  # fmt: skip
+        "data": {"parts": len(train), "name": data.name},
+        "seed": seed,
+        "steps": result.steps,
+        "samples": before.get("samples", 0) + result.samples,
+        "scores": scores,
+    }
     weights.save_disn(weights.disn_path(shape, out), net, facts)
     return {**result.metrics, **scores}
 
@@ -153,10 +172,12 @@ def sampled_scores(net: Disn, parts: PartData, points: int) -> dict[str, float]:
     mask = as_input(parts.mask(chosen, views, "visible")).to(device)
     anchors = torch.from_numpy(turned(parts.anchors[chosen], views)).to(device)
     with torch.inference_mode():
-        found = torch.cat([
-            net(mask[i : i + 16], anchors[i : i + 16], torch.from_numpy(places[i : i + 16]).to(device)).float()
-            for i in range(0, len(chosen), 16)
-        ])  # fmt: skip
+        found = torch.cat(
+            [
+                net(mask[i : i + 16], anchors[i : i + 16], torch.from_numpy(places[i : i + 16]).to(device)).float()
+                for i in range(0, len(chosen), 16)
+            ]
+        )
     right = ((found < 0) == (target < 0)).float().mean()
     return {"l1": float((found - target).abs().mean()), "sign": float(right)}
 

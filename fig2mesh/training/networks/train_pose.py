@@ -83,13 +83,32 @@ def train_pose(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=200, clip=1.0, device=device, amp=amp, validations=10,
-        arguments={"joints": shape.joints, "perspective": shape.perspective, "visibility": shape.visibility,
-                   "metric": shape.metric, "width": shape.width, "augment": augment,
-                   "limbs": shape.limbs, "dropout": dropout,
-                   "data": hashlib.sha256(train.rotations.tobytes() + train.reach.tobytes()).hexdigest()[:16]},
-    )  # fmt: skip
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=200,
+        clip=1.0,
+        device=device,
+        amp=amp,
+        validations=10,
+        arguments={
+            "joints": shape.joints,
+            "perspective": shape.perspective,
+            "visibility": shape.visibility,
+            "metric": shape.metric,
+            "width": shape.width,
+            "augment": augment,
+            "limbs": shape.limbs,
+            "dropout": dropout,
+            "data": hashlib.sha256(train.rotations.tobytes() + train.reach.tobytes()).hexdigest()[:16],
+        },
+    )
     scores = {
         f"{name}_{score}": value
         for name, view in VIEWS.items()

@@ -66,8 +66,11 @@ def train_refine(
         return {"loss": picture_loss(found, sides.truth, sides.known)}
 
     result = _run(net, step, lambda: refine_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
-    found = {f"{split}_{name}": value for split, painter in held.items()
-             for name, value in refine_scores(net, painter).items()}  # fmt: skip
+    found = {
+        f"{split}_{name}": value
+        for split, painter in held.items()
+        for name, value in refine_scores(net, painter).items()
+    }
     save_refine(refine_path(out), net, _facts(data, len(known), seed, result, found, out))
     return found
 
@@ -98,8 +101,9 @@ def train_head(
         return head_losses(model(inputs), truth, there)
 
     result = _run(net, step, lambda: head_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
-    found = {f"{split}_{name}": value for split, painter in held.items()
-             for name, value in head_scores(net, painter).items()}  # fmt: skip
+    found = {
+        f"{split}_{name}": value for split, painter in held.items() for name, value in head_scores(net, painter).items()
+    }
     save_head(head_path(out), net, _facts(data, len(known), seed, result, found, out))
     return found
 
@@ -195,12 +199,30 @@ def _run(
 ) -> Result:
     optimizer = torch.optim.AdamW(net.parameters(), RATE, weight_decay=1e-4)
     return run_loop(
-        model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=100, clip=1.0, amp=True, validations=5, arguments={"data": recipe_digest(data)},
-    )  # fmt: skip
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=100,
+        clip=1.0,
+        amp=True,
+        validations=5,
+        arguments={"data": recipe_digest(data)},
+    )
 
 
 def _facts(data: Path, bodies: int, seed: int, result: Result, found: Scores, out: Path) -> dict[str, object]:
     write_scores(out, found)
-    return {"data": recipe_digest(data), "bodies": bodies, "seed": seed, "steps": result.steps,
-            "samples": result.samples, "scores": found}  # fmt: skip
+    return {
+        "data": recipe_digest(data),
+        "bodies": bodies,
+        "seed": seed,
+        "steps": result.steps,
+        "samples": result.samples,
+        "scores": found,
+    }

@@ -144,18 +144,31 @@ def train_size(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, clip=1.0, device=device, amp=False,
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        clip=1.0,
+        device=device,
+        amp=False,
         arguments={"kind": kind, "data": recipe_digest(data), "parts": len(known.size)},
-    )  # fmt: skip
+    )
     scores = {
         f"{split}_{name}": value for split, columns in held.items() for name, value in size_scores(net, columns).items()
     }
     write_scores(out, scores)
     facts = {
-        "data": {"parts": len(known.size), "name": data.name}, "seed": seed, "steps": result.steps,
-        "samples": result.samples, "scores": scores,
-    }  # fmt: skip
+        "data": {"parts": len(known.size), "name": data.name},
+        "seed": seed,
+        "steps": result.steps,
+        "samples": result.samples,
+        "scores": scores,
+    }
     save_size(size_path(kind, out), net, facts)
     return net, scores
 

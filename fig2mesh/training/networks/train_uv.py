@@ -77,16 +77,41 @@ def train_uv(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net, optimizer=optimizer, step=step, validate=validate, folder=out, budget_min=budget_min, steps=steps,
-        seed=seed, batch=batch, warmup=100, clip=1.0, device=device, amp=amp, validations=6,
-        arguments={"masks": shape.masks, "filters": shape.filters, "data": recipe_digest(data),
-                   "init_samples": before.get("samples", 0)},
-    )  # fmt: skip
-    found = {f"{split}_{name}": value for split, drawings in held.items()
-             for name, value in scores(net, drawings, device).items()}  # fmt: skip
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=100,
+        clip=1.0,
+        device=device,
+        amp=amp,
+        validations=6,
+        arguments={
+            "masks": shape.masks,
+            "filters": shape.filters,
+            "data": recipe_digest(data),
+            "init_samples": before.get("samples", 0),
+        },
+    )
+    found = {
+        f"{split}_{name}": value
+        for split, drawings in held.items()
+        for name, value in scores(net, drawings, device).items()
+    }
     write_scores(out, found)
-    facts = {"data": recipe_digest(data), "bodies": len(known), "seed": seed, "steps": result.steps,
-             "samples": before.get("samples", 0) + result.samples, "scores": found}  # fmt: skip
+    facts = {
+        "data": recipe_digest(data),
+        "bodies": len(known),
+        "seed": seed,
+        "steps": result.steps,
+        "samples": before.get("samples", 0) + result.samples,
+        "scores": found,
+    }
     save_uv(uv_path(shape, out), net, facts)
     return found
 

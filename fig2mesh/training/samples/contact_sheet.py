@@ -25,12 +25,14 @@ REACH: Final = 1.15
 """Half of what a tile without a frame of its own shows, FIGURE units, about the pelvis or the joints' middle."""
 SHOWN: Final = ("torso", "head", "l_hand", "l_upper_leg", "r_foot")
 """The parts whose masks are shown."""
+# fmt: off
 LIMBS: Final = (
     ("head", "eyes"), ("head", "neck"), ("neck", "thorax"), ("thorax", "pelvis"),
     *((f"{s}_{a}" if a[0] != "!" else a[1:], f"{s}_{b}") for s in "lr" for a, b in (
         ("!thorax", "shoulder"), ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "hand"),
         ("!pelvis", "hip"), ("hip", "knee"), ("knee", "ankle"), ("ankle", "foot"))),
-)  # fmt: skip
+)
+# fmt: on
 """Joints that the overlay joins."""
 EMPTY, PAPER, INK = 226.0, 250.0, (40.0, 40.0, 46.0)
 SIDE_INK: Final = {"l": (40.0, 80.0, 220.0), "r": (220.0, 50.0, 40.0)}

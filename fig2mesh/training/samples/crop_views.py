@@ -14,9 +14,11 @@ from fig2mesh.skeleton import JOINT_MIRROR
 from fig2mesh.training.drawing.background import draw_background
 from fig2mesh.training.samples.crop_data import Crops
 
+# fmt: off
 MIRRORED: Final = np.array([
     PART_NAMES.index({"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]) for name in PART_NAMES
-], np.uint8)  # fmt: skip
+], np.uint8)
+# fmt: on
 """Part label of the other side."""
 
 MAPS: Final = ("coast", "realms", "fields", "town", "paper", "coast", "town", "paper")
@@ -42,10 +44,12 @@ class Viewer:
     def __init__(self, crops: Crops, seed: int = 0, grounds: int = 160, size: int = INPUT) -> None:
         self.crops, self.size = crops, size
         rng = np.random.default_rng([23, seed])
-        self.grounds = np.stack([
-            np.clip(draw_background(MAPS[index % len(MAPS)], (256, 256), rng), 0, 255).astype(np.uint8)
-            for index in range(grounds)
-        ])  # fmt: skip
+        self.grounds = np.stack(
+            [
+                np.clip(draw_background(MAPS[index % len(MAPS)], (256, 256), rng), 0, 255).astype(np.uint8)
+                for index in range(grounds)
+            ]
+        )
 
     def view(self, index: int, rng: np.random.Generator) -> View:
         """Crop `index` as it may be met."""
@@ -59,9 +63,13 @@ class Viewer:
             reduced = float(np.abs(np.linalg.det(matrix[:, :2]))) < 0.3
             border = rgba[..., :3].reshape(-1, 3)[rng.integers(256)].tolist()
             picture = cv2.warpAffine(
-                rgba[..., :3], matrix, size, flags=cv2.INTER_AREA if reduced else cv2.INTER_LINEAR,
-                borderMode=cv2.BORDER_CONSTANT, borderValue=border,
-            ).astype(np.float32)  # fmt: skip
+                rgba[..., :3],
+                matrix,
+                size,
+                flags=cv2.INTER_AREA if reduced else cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_CONSTANT,
+                borderValue=border,
+            ).astype(np.float32)
         else:
             picture = self._ground(rng)
             if rng.random() < 0.22:
@@ -76,9 +84,12 @@ class Viewer:
         share = (joints / self.size).astype(np.float32)
         inside = ((share > 0) & (share < 1)).all(axis=1)
         return View(
-            scanned(np.ascontiguousarray(picture, np.float32), rng), np.ascontiguousarray(labels), share,
-            visible & inside, inside,
-        )  # fmt: skip
+            scanned(np.ascontiguousarray(picture, np.float32), rng),
+            np.ascontiguousarray(labels),
+            share,
+            visible & inside,
+            inside,
+        )
 
     def _ground(self, rng: np.random.Generator) -> NDArray[np.float32]:
         kind = rng.random()

@@ -39,11 +39,13 @@ ON_PAPER: Final = 0.4
 YAWS: Final = ((0.0, 22.0, 0.64), (90.0, 22.0, 0.13), (-90.0, 22.0, 0.13), (180.0, 30.0, 0.1))
 """Mean and spread of the camera's yaw, degrees, on top of the body's own turn; and how often."""
 
+# fmt: off
 _LIMBS: Final = {
     "shoulder": ("torso", "upper_arm"), "elbow": ("upper_arm", "lower_arm"), "wrist": ("lower_arm", "hand"),
     "hand": ("hand", "lower_arm"), "hip": ("torso", "upper_leg"), "knee": ("upper_leg", "lower_leg"),
     "ankle": ("lower_leg", "foot"), "foot": ("foot",),
-}  # fmt: skip
+}
+# fmt: on
 
 OWN: Final = {
     "head": ("head", "hair"),
@@ -85,8 +87,13 @@ def body_crops(pack: Pack, split: str, number: int, count: int = 4) -> list[Crop
     return [crop for crop in crops if crop is not None]
 
 
-def cut(rgba: NDArray[np.uint8], labels: NDArray[np.uint8], joints: NDArray[np.floating], visible: NDArray[np.bool_],
-        margin: float) -> Crop | None:  # fmt: skip
+def cut(
+    rgba: NDArray[np.uint8],
+    labels: NDArray[np.uint8],
+    joints: NDArray[np.floating],
+    visible: NDArray[np.bool_],
+    margin: float,
+) -> Crop | None:
     """The square round the figure, resized to `SIZE`; None where there is none. Beyond the picture nothing is seen."""
     rows, columns = np.flatnonzero((labels > 0).any(axis=1)), np.flatnonzero((labels > 0).any(axis=0))
     if len(rows) < 8 or len(columns) < 4:
@@ -119,8 +126,12 @@ def _centred(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _turned(subject: Subject, yaw_deg: float) -> Subject:
     turn = axes(yaw_deg).T
-    return replace(subject, vertices=subject.vertices @ turn, joints=subject.joints @ turn,
-                   skirt_vertices=subject.skirt_vertices @ turn)  # fmt: skip
+    return replace(
+        subject,
+        vertices=subject.vertices @ turn,
+        joints=subject.joints @ turn,
+        skirt_vertices=subject.skirt_vertices @ turn,
+    )
 
 
 def _draw(subject: Subject, rng: np.random.Generator) -> Crop | None:

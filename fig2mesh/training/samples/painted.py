@@ -34,10 +34,12 @@ class Painter:
         self.drawings = drawings
         unfolded = unfold(drawings)
         self.front = unfolded.front
-        self.places = np.stack([
-            places(labels, depth).astype(np.float16)
-            for labels, depth in zip(drawings.labels, drawings.depth, strict=True)
-        ])  # fmt: skip
+        self.places = np.stack(
+            [
+                places(labels, depth).astype(np.float16)
+                for labels, depth in zip(drawings.labels, drawings.depth, strict=True)
+            ]
+        )
         changes: list[NDArray[np.float16]] = []
         with torch.no_grad():
             for first in range(0, len(drawings), 16):

@@ -65,8 +65,14 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
     near = depth[0][labels[0] > 0]
     far = -depth[2][labels[2] > 0]
     middle = (float(near.max()) + float(far.min())) / 2
-    z = np.stack([depth[0], np.broadcast_to(middle - along, depth[1].shape), -depth[2],
-                  np.broadcast_to(middle + along, depth[3].shape)])  # fmt: skip
+    z = np.stack(
+        [
+            depth[0],
+            np.broadcast_to(middle - along, depth[1].shape),
+            -depth[2],
+            np.broadcast_to(middle + along, depth[3].shape),
+        ]
+    )
     points = np.concatenate([place * [half, -half], z[..., None]], axis=-1)
     points = np.where((labels > 0)[..., None], points, 0.0).astype(np.float32)
     picture = drawings.picture[row].astype(np.float32)

@@ -48,8 +48,9 @@ def front_scale(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> tuple
     Depths from left and right tell how wide the front is. labels, depth : (4, H, W)
     """
     columns = np.flatnonzero((labels[0] > 0).any(axis=0))
-    left, right = (sign * float(np.asarray(depth[view], np.float64)[labels[view] > 0].max())
-                   for view, sign in ((1, 1), (3, -1)))  # fmt: skip
+    left, right = (
+        sign * float(np.asarray(depth[view], np.float64)[labels[view] > 0].max()) for view, sign in ((1, 1), (3, -1))
+    )
     return (left - right) / (columns[-1] - columns[0] + 1), (left + right) / 2
 
 
@@ -109,7 +110,13 @@ def _unfold(drawings: Drawings, row: int) -> tuple[NDArray[np.generic], ...]:
     part[cell[:, 1], cell[:, 0]] = labels[known]
     there = total > 0
     return (
-        means[..., :2].astype(np.float16), there, means[..., 5] > 0, means[..., 6] > 0.5,
-        np.clip(np.round(means[..., 2:5]), 0, 255).astype(np.uint8), np.clip(total, 0, 1).astype(np.float16), part,
-        carried_on(drawings.picture[row, 0], inner[0]), labels[0] > 0,
-    )  # fmt: skip
+        means[..., :2].astype(np.float16),
+        there,
+        means[..., 5] > 0,
+        means[..., 6] > 0.5,
+        np.clip(np.round(means[..., 2:5]), 0, 255).astype(np.uint8),
+        np.clip(total, 0, 1).astype(np.float16),
+        part,
+        carried_on(drawings.picture[row, 0], inner[0]),
+        labels[0] > 0,
+    )

@@ -36,10 +36,18 @@ def test_values_are_plain_and_stay_so(pairs: list[tuple[str, object]]) -> None:
 @pytest.mark.parametrize(
     ("given_value", "wanted"),
     [
-        (np.int64(3), 3), (np.uint8(3), 3), (np.float32(0.5), 0.5), (np.bool_(True), True), (np.float64("nan"), None),
-        (np.str_("a"), "a"), (Fraction(1, 2), 0.5), ("a\0b", "ab"), ("a\ud800b", "a?b"), (float("inf"), None),
+        (np.int64(3), 3),
+        (np.uint8(3), 3),
+        (np.float32(0.5), 0.5),
+        (np.bool_(True), True),
+        (np.float64("nan"), None),
+        (np.str_("a"), "a"),
+        (Fraction(1, 2), 0.5),
+        ("a\0b", "ab"),
+        ("a\ud800b", "a?b"),
+        (float("inf"), None),
     ],
-)  # fmt: skip
+)
 def test_scalars_of_others(given_value: object, wanted: object) -> None:
     ((_, found),) = plain_attributes({"x": given_value})
     assert found == wanted

@@ -83,8 +83,8 @@ def test_clamped_figures_stand_on_the_terrain(height: float, mode: Any, referenc
 
 def test_text_of_others_is_escaped() -> None:
     evil = PlacedFigure(
-        "<b>", ZURICH, (0, 0, 0), (1, 1, 1), ("x.glb",), (0.0,), "<script>alert('a')</script>", "A & B \"C\"", ("<i>",)
-    )  # fmt: skip
+        "<b>", ZURICH, (0, 0, 0), (1, 1, 1), ("x.glb",), (0.0,), "<script>alert('a')</script>", 'A & B "C"', ("<i>",)
+    )
     text = description(evil)
     assert "<script>" not in text
     assert "&lt;script&gt;alert(&#x27;a&#x27;)&lt;/script&gt;" in text
@@ -163,13 +163,23 @@ def test_faults_of_czml(tmp_path: Path, fault: str) -> None:
 
 
 def test_files_of_others(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    places = {"type": "FeatureCollection", "crs": {}, "features": [
-        {"type": "Feature", "properties": None, "geometry": None},
-        {"type": "Feature", "properties": {"model": "https://example.org/a.glb"},
-         "geometry": {"type": "Point", "coordinates": [1, 2]}},
-        {"type": "Feature", "properties": {}, "geometry": {
-            "type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]}},
-    ]}  # fmt: skip
+    places = {
+        "type": "FeatureCollection",
+        "crs": {},
+        "features": [
+            {"type": "Feature", "properties": None, "geometry": None},
+            {
+                "type": "Feature",
+                "properties": {"model": "https://example.org/a.glb"},
+                "geometry": {"type": "Point", "coordinates": [1, 2]},
+            },
+            {
+                "type": "Feature",
+                "properties": {},
+                "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]},
+            },
+        ],
+    }
     (tmp_path / "a.geojson").write_text(json.dumps(places))
     found = validate(tmp_path / "a.geojson")
     assert [(each.severity, each.code) for each in found] == [("warning", "CRS"), ("info", "NOT_CHECKED")]

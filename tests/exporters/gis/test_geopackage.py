@@ -170,10 +170,14 @@ def test_the_index_finds_what_a_search_finds(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("late", "kind", "first"),
     [
-        (None, "INTEGER", 5), (7, "INTEGER", 5), (0.5, "REAL", 5.0), ("ca. 1893", "TEXT", "5"), (2**63, "TEXT", "5"),
+        (None, "INTEGER", 5),
+        (7, "INTEGER", 5),
+        (0.5, "REAL", 5.0),
+        ("ca. 1893", "TEXT", "5"),
+        (2**63, "TEXT", "5"),
         (True, "INTEGER", 5),
     ],
-)  # fmt: skip
+)
 def test_a_column_holds_its_last_value_too(tmp_path: Path, late: Any, kind: str, first: Any) -> None:
     figures = [figure("a", ZURICH, {"year": 5 if number < 20 else late}) for number in range(21)]
     write_geopackage(figures, tmp_path / "a.gpkg")

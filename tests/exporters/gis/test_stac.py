@@ -110,8 +110,10 @@ def test_pystac_walks_all_items_and_assets(tmp_path: Path) -> None:
         assert item.get_collection() is not None
         assert item.get_root() is item.get_parent() is collection
     assert {path.name for path in (tmp_path / "mövéd" / "龍").iterdir()} == {
-        "tiles", "龍.stac.json", *("龍" + end for end in ENDS)
-    }  # fmt: skip
+        "tiles",
+        "龍.stac.json",
+        *("龍" + end for end in ENDS),
+    }
 
 
 def test_everything_is_valid(tmp_path: Path) -> None:
@@ -245,8 +247,9 @@ def test_no_figures_are_a_valid_collection(tmp_path: Path) -> None:
     document = _read(tmp_path / "collection.json")
     _validate(document)
     assert document["extent"] == {
-        "spatial": {"bbox": [[-180.0, -90.0, 180.0, 90.0]]}, "temporal": {"interval": [[None, None]]}
-    }  # fmt: skip
+        "spatial": {"bbox": [[-180.0, -90.0, 180.0, 90.0]]},
+        "temporal": {"interval": [[None, None]]},
+    }
     assert list(pystac.Collection.from_file(str(tmp_path / "collection.json")).get_items()) == []
 
 

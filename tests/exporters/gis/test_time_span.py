@@ -38,11 +38,25 @@ def test_dates(text: str, start: str, end: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "", "ca. 1893", "93", "18930", "1893-13", "1893-02-29", "1893-5", "0000", "1893-05-17T25:00", "1895/1893",
-        "1893/", "1893/1894/1895", "1893-W05", "today", "１８９３", "0001-01-01T00:00:00+02:00",
+        "",
+        "ca. 1893",
+        "93",
+        "18930",
+        "1893-13",
+        "1893-02-29",
+        "1893-5",
+        "0000",
+        "1893-05-17T25:00",
+        "1895/1893",
+        "1893/",
+        "1893/1894/1895",
+        "1893-W05",
+        "today",
+        "１８９３",
+        "0001-01-01T00:00:00+02:00",
         "9999-12-31T23:00:00-02:00",
     ],
-)  # fmt: skip
+)
 def test_what_is_no_date(text: str) -> None:
     with pytest.raises(ExportError, match=r"date of anna: .* (is no date|ends before it starts)"):
         time_span(text, "date of anna")

@@ -68,8 +68,11 @@ def test_figures_without_parts_have_no_batches() -> None:
 def test_a_tileset_of_version_1_0_is_clean(tmp_path: Path) -> None:
     write_tileset(asset(ZURICH), tmp_path, version="1.0")
     assert {file.name for file in tmp_path.iterdir()} == {
-        "tileset.json", "farmer.b3dm", "farmer_lod1.b3dm", "farmer_lod2.b3dm"
-    }  # fmt: skip
+        "tileset.json",
+        "farmer.b3dm",
+        "farmer_lod1.b3dm",
+        "farmer_lod2.b3dm",
+    }
     document = json.loads((tmp_path / "tileset.json").read_text())
     assert document["asset"]["version"] == "1.0"
     assert document["extras"] == {"name": "farmer", "copyright": "© Zürich map, CC BY 4.0"}

@@ -151,8 +151,12 @@ def test_overwriting_takes_away_what_only_the_old_tileset_named(tmp_path: Path, 
         write_figures([folder / "0.glb"], tmp_path / "out")
     write_figures([folder / "0.glb"], tmp_path / "out", overwrite=True)
     assert set(_bytes(tmp_path / "out")) == {
-        "tileset.json", "index.geojson", "figures.czml", "figures/farmer.glb", "figures/mine.txt"
-    }  # fmt: skip
+        "tileset.json",
+        "index.geojson",
+        "figures.czml",
+        "figures/farmer.glb",
+        "figures/mine.txt",
+    }
 
 
 def test_foreign_tilesets_lose_nothing_but_the_names_we_need(tmp_path: Path, folder: Path) -> None:

@@ -84,11 +84,17 @@ def test_figures_anywhere_are_reached_once_and_inside_all_boxes(places: list[Geo
         [GeoPlacement(180, 10), GeoPlacement(-180, 10), GeoPlacement(179.99999, 10), GeoPlacement(-179.99999, 10)],
         [GeoPlacement(8.5, 47.4, 400.0)] * 50,
         [GeoPlacement(0, 0), GeoPlacement(180, 0)],
-        [GeoPlacement(0, 0), GeoPlacement(90, 0), GeoPlacement(180, 0), GeoPlacement(-90, 0), GeoPlacement(0, 90),
-         GeoPlacement(0, -90)],
+        [
+            GeoPlacement(0, 0),
+            GeoPlacement(90, 0),
+            GeoPlacement(180, 0),
+            GeoPlacement(-90, 0),
+            GeoPlacement(0, 90),
+            GeoPlacement(0, -90),
+        ],
     ],
     ids=["north pole", "south pole", "antimeridian", "one place", "antipodes", "all round"],
-)  # fmt: skip
+)
 def test_special_places_are_places_like_others(places: list[GeoPlacement]) -> None:
     figures = [figure(place, number) for number, place in enumerate(places)]
     check_laws(figures, documents(figures))
@@ -194,19 +200,36 @@ def test_a_coarse_level_is_never_worse_than_the_tileset() -> None:
 
 def test_metadata_is_on_every_level_and_only_what_is_known() -> None:
     known = PlacedFigure(
-        "Bäuerin", GeoPlacement(8.5, 47.4, 400.0, heading_deg=10.0, figure_height_m=1.6), LOW, HIGH, ("a.glb", "b.glb"),
-        (0.0, 0.1), "map.png", "© Zürich", ("head", "torso"), (0.5, 0.25), 0.3,
-    )  # fmt: skip
+        "Bäuerin",
+        GeoPlacement(8.5, 47.4, 400.0, heading_deg=10.0, figure_height_m=1.6),
+        LOW,
+        HIGH,
+        ("a.glb", "b.glb"),
+        (0.0, 0.1),
+        "map.png",
+        "© Zürich",
+        ("head", "torso"),
+        (0.5, 0.25),
+        0.3,
+    )
     unknown = PlacedFigure("x", GeoPlacement(8.5, 47.4), LOW, HIGH, ("c.glb",), (0.0,))
     (document,) = documents([known, unknown]).values()
     assert document["metadata"] == {"class": "collection", "properties": {"figures": 2}}
     said = {met.uri: met.tile["metadata"]["properties"] for met in contents({"tileset.json": document})}
     assert said["a.glb"] == said["b.glb"]
     assert said["a.glb"] == {
-        "name": "Bäuerin", "source": "map.png", "copyright": "© Zürich", "parts": ["head", "torso"],
-        "partsObservedShare": [0.5, 0.25], "observedShare": 0.3, "longitude": 8.5, "latitude": 47.4, "height": 400.0,
-        "heading": 10.0, "figureHeight": 1.6,
-    }  # fmt: skip
+        "name": "Bäuerin",
+        "source": "map.png",
+        "copyright": "© Zürich",
+        "parts": ["head", "torso"],
+        "partsObservedShare": [0.5, 0.25],
+        "observedShare": 0.3,
+        "longitude": 8.5,
+        "latitude": 47.4,
+        "height": 400.0,
+        "heading": 10.0,
+        "figureHeight": 1.6,
+    }
     assert set(said["c.glb"]) == {"name", "longitude", "latitude", "height", "heading", "figureHeight"}
 
 

@@ -42,9 +42,16 @@ def test_a_folder_holds_all_that_the_page_needs(tmp_path: Path, farmer: Path, ce
     words += ["--overlay", str(tmp_path / "map.png"), "8", "47", "9", "48"]
     assert main(words) == 0
     assert names(out) == {
-        "index.html", "assets/0/farmer.glb", "assets/1/tileset.json", "assets/1/farmer.glb", "assets/1/farmer_lod1.glb",
-        "assets/1/farmer_lod2.glb", "overlays/0.png", "cesium/Cesium.js", "cesium/Widgets/widgets.css",
-    }  # fmt: skip
+        "index.html",
+        "assets/0/farmer.glb",
+        "assets/1/tileset.json",
+        "assets/1/farmer.glb",
+        "assets/1/farmer_lod1.glb",
+        "assets/1/farmer_lod2.glb",
+        "overlays/0.png",
+        "cesium/Cesium.js",
+        "cesium/Widgets/widgets.css",
+    }
     page = (out / "index.html").read_text(encoding="utf-8")
     assert '"url": "assets/1/tileset.json"' in page
     assert '"rectangle": [8.0, 47.0, 9.0, 48.0]' in page

@@ -161,9 +161,7 @@ def test_a_missing_encoder_is_said_before_the_work(
     monkeypatch.setitem(sys.modules, "meshopt", None)
     assert main(arguments(files, "--profile", "cesiumjs", "-o", str(tmp_path / "a.glb"))) == 2
     said = capfd.readouterr().err.strip()
-    assert said == (
-        'fig2mesh: --profile: compression needs the package meshopt; pip install "fig2mesh[compression]"'
-    )  # fmt: skip
+    assert said == ('fig2mesh: --profile: compression needs the package meshopt; pip install "fig2mesh[compression]"')
     assert not (tmp_path / "a.glb").exists()
 
 

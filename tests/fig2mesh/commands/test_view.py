@@ -53,9 +53,20 @@ def test_the_server_answers_with_page_and_folder(server: http.client.HTTPConnect
 
 @pytest.mark.parametrize(
     "path",
-    ["/other", "/cesium", "/cesium/", "/cesium/deep", "/cesium/../secret.txt", "/cesium/%2e%2e/secret.txt",
-     "/cesium/link.txt", "/cesium/a%00b", "/../secret.txt", "//etc/passwd", "/cesium//etc/passwd"],
-)  # fmt: skip
+    [
+        "/other",
+        "/cesium",
+        "/cesium/",
+        "/cesium/deep",
+        "/cesium/../secret.txt",
+        "/cesium/%2e%2e/secret.txt",
+        "/cesium/link.txt",
+        "/cesium/a%00b",
+        "/../secret.txt",
+        "//etc/passwd",
+        "/cesium//etc/passwd",
+    ],
+)
 def test_the_server_gives_nothing_else(server: http.client.HTTPConnection, path: str) -> None:
     status, _, body = answer(server, path)
     assert status == 404

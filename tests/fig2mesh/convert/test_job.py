@@ -182,8 +182,13 @@ def test_resuming_gives_the_same_model(finished: Run, tmp_path: Path) -> None:
     assert target.read_bytes() == finished.output("a.glb").read_bytes()
     stages = json.loads((tmp_path / "r.json").read_text())["stages"]
     assert {stage["stage"] for stage in stages if not stage["run"]} == {
-        "lift", "parts", "cloud", "solid", "simplify", "surface",
-    }  # fmt: skip
+        "lift",
+        "parts",
+        "cloud",
+        "solid",
+        "simplify",
+        "surface",
+    }
 
 
 def test_tiles_for_older_clients(finished: Run, tmp_path: Path) -> None:

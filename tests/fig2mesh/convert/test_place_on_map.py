@@ -175,8 +175,17 @@ def test_bbox_reduction_and_cutting_do_not_move_the_feet(sheet: Sheet, read: Fig
 
 
 def asked(sheet: Path | None, **more: Any) -> PlaceRequest:
-    return PlaceRequest(**{"lonlat": None, "facing": "viewer", "height_m": None, "altitude": 0.0,
-                           "altitude_datum": "ellipsoid", "map_sheet": sheet, **more})  # fmt: skip
+    return PlaceRequest(
+        **{
+            "lonlat": None,
+            "facing": "viewer",
+            "height_m": None,
+            "altitude": 0.0,
+            "altitude_datum": "ellipsoid",
+            "map_sheet": sheet,
+            **more,
+        }
+    )
 
 
 def test_the_pixel_may_be_given(sheet: Sheet, read: Figure) -> None:
@@ -222,6 +231,7 @@ def test_an_annotation_made_for_a_larger_scan(sheet: Sheet, read: Figure, tmp_pa
     assert (placed.lon_deg, placed.lat_deg) == pytest.approx(tuple(lonlat(foot_on_picture(read))[0]), abs=1e-7)
 
 
+# fmt: off
 BAD = {
     "twice": (["--map", "map.png", "--lonlat", "8", "47"], "--map: beside --lonlat"),
     "at alone": (["--at", "1", "2"], "--at: given without a map"),
@@ -239,7 +249,8 @@ BAD = {
     "clamp to a datum": (
         ["--map", "map.png", "--altitude-mode", "clamp", "--altitude-datum", "egm96"], "heights above terrain have none"
     ),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.mark.parametrize("name", BAD)

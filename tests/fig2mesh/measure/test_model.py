@@ -206,8 +206,12 @@ def test_shape_of_a_split_sphere(ball: TexturedMesh) -> None:
     found = shape_measures(split(ball))
     volume = found.pop("volume_m3")
     assert found == {
-        "watertight": True, "winding_consistent": True, "components": 1, "genus": 0, "triangles": len(ball.faces),
-    }  # fmt: skip
+        "watertight": True,
+        "winding_consistent": True,
+        "components": 1,
+        "genus": 0,
+        "triangles": len(ball.faces),
+    }
     # An inscribed polyhedron of this many sides lacks a fifth of a percent.
     assert volume == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.003)
 

@@ -12,9 +12,11 @@ from exporters.asset import Texture, TexturedMesh
 from fig2mesh.field.camera import axes
 from fig2mesh.mesh.preview import LIGHT, render_mesh, view_bounds, views_sheet, write_preview
 
+# fmt: off
 FRONT, LEFT, BACK, RIGHT, TOP, BOTTOM = (
     (220, 30, 30), (30, 200, 30), (30, 30, 220), (220, 200, 30), (200, 30, 200), (30, 200, 200),
-)  # fmt: skip
+)
+# fmt: on
 SIDES = {
     FRONT: ((0, 0, 1), (1, 0, 0)),
     LEFT: ((1, 0, 0), (0, 0, -1)),

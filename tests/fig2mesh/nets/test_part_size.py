@@ -41,9 +41,14 @@ def write_shards(folder: Path, bodies: int = 24) -> None:
         hidden = filled.copy()
         hidden[:, 1:] = False
         np.savez(
-            folder / f"{split}-00000.npz", joints=placed, centre=centre, size=size, edge=edge,
-            mask_amodal=np.packbits(filled, axis=-1), mask_visible=np.packbits(hidden, axis=-1),
-        )  # fmt: skip
+            folder / f"{split}-00000.npz",
+            joints=placed,
+            centre=centre,
+            size=size,
+            edge=edge,
+            mask_amodal=np.packbits(filled, axis=-1),
+            mask_visible=np.packbits(hidden, axis=-1),
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)

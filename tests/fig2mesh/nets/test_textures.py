@@ -86,8 +86,9 @@ def test_colours_survive_the_disc() -> None:
     for colour, (x, y, value) in zip(COLOURS[0].reshape(3, -1).T.tolist()[:200], found[:200], strict=True):
         hue, saturation, brightness = colorsys.rgb_to_hsv(*colour)
         angle = 2 * np.pi * hue
-        np.testing.assert_allclose((x, y, value), (saturation * np.cos(angle), saturation * np.sin(angle), brightness),
-                                   atol=1e-5)  # fmt: skip
+        np.testing.assert_allclose(
+            (x, y, value), (saturation * np.cos(angle), saturation * np.sin(angle), brightness), atol=1e-5
+        )
 
 
 def test_greys_have_no_hue() -> None:

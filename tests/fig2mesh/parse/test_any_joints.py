@@ -18,9 +18,27 @@ from fig2mesh.records import JOINT_NAMES
 
 NUMBERS = st.floats() | st.integers()
 KEYS = st.sampled_from(
-    ["keypoints", "annotations", "categories", "images", "shapes", "objects", "points", "exterior", "nodes", "loc",
-     "label", "width", "height", "size", "depth_order", "id", "l_arm", *JOINT_NAMES]
-) | st.text(max_size=5)  # fmt: skip
+    [
+        "keypoints",
+        "annotations",
+        "categories",
+        "images",
+        "shapes",
+        "objects",
+        "points",
+        "exterior",
+        "nodes",
+        "loc",
+        "label",
+        "width",
+        "height",
+        "size",
+        "depth_order",
+        "id",
+        "l_arm",
+        *JOINT_NAMES,
+    ]
+) | st.text(max_size=5)
 ANYTHING = st.recursive(
     st.none() | st.booleans() | NUMBERS | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(KEYS, inner, max_size=6),

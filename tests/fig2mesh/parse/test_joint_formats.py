@@ -21,11 +21,13 @@ from tests.drawn import JOINTS
 DRAWN = np.array([JOINTS[name] for name in JOINT_NAMES], np.float32)
 SEEN = np.array([name not in ("l_hand", "r_hip") for name in JOINT_NAMES])
 
+# fmt: off
 COCO_17 = (
     "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder", "left_elbow",
     "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee", "right_knee", "left_ankle",
     "right_ankle",
-)  # fmt: skip
+)
+# fmt: on
 """The names of COCO's person category: https://cocodataset.org/#keypoints-2020"""
 
 
@@ -61,11 +63,21 @@ def test_every_bone_joins_two_joints_and_all_are_joined() -> None:
 @pytest.mark.parametrize(
     ("written", "ours"),
     [
-        ("Left Shoulder", "l_shoulder"), ("leftShoulder", "l_shoulder"), ("shoulder_r", "r_shoulder"),
-        ("RIGHT-KNEE", "r_knee"), ("L Toe", "l_foot"), ("hip", "pelvis"), ("left hip", "l_hip"), ("chest", "thorax"),
-        ("left_foot_index", "l_foot"), ("eyes", "eyes"), ("left_eye", "l_eye"), ("Head", "head"), ("hat", "hat"),
+        ("Left Shoulder", "l_shoulder"),
+        ("leftShoulder", "l_shoulder"),
+        ("shoulder_r", "r_shoulder"),
+        ("RIGHT-KNEE", "r_knee"),
+        ("L Toe", "l_foot"),
+        ("hip", "pelvis"),
+        ("left hip", "l_hip"),
+        ("chest", "thorax"),
+        ("left_foot_index", "l_foot"),
+        ("eyes", "eyes"),
+        ("left_eye", "l_eye"),
+        ("Head", "head"),
+        ("hat", "hat"),
     ],
-)  # fmt: skip
+)
 def test_names(written: str, ours: str) -> None:
     assert canonical(written) == ours
 
@@ -152,15 +164,36 @@ def test_damaged_files_are_one_line(tmp_path: Path, content: Any, finding: str) 
 @given(
     st.recursive(
         st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-        lambda inner: st.lists(inner, max_size=4)
-        | st.dictionaries(
-            st.sampled_from(["shapes", "objects", "annotations", "keypoints", "categories", "images", "points", "label",
-                             "geometryType", "nodes", "loc", "size", "flags", "id", "image_id", "group_id"]),
-            inner, max_size=5,
+        lambda inner: (
+            st.lists(inner, max_size=4)
+            | st.dictionaries(
+                st.sampled_from(
+                    [
+                        "shapes",
+                        "objects",
+                        "annotations",
+                        "keypoints",
+                        "categories",
+                        "images",
+                        "points",
+                        "label",
+                        "geometryType",
+                        "nodes",
+                        "loc",
+                        "size",
+                        "flags",
+                        "id",
+                        "image_id",
+                        "group_id",
+                    ]
+                ),
+                inner,
+                max_size=5,
+            )
         ),
         max_leaves=20,
     )
-)  # fmt: skip
+)
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 def test_whatever_json_it_is_the_answer_is_a_line(tmp_path_factory: pytest.TempPathFactory, content: Any) -> None:
     path = tmp_path_factory.getbasetemp() / "any.json"

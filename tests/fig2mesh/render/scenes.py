@@ -30,10 +30,12 @@ def ball(radius: float = 0.5) -> FieldScene:
 
 def balls() -> Body:
     """A torso below and a head above, which overlap."""
-    return Body((
-        sample(sphere((0, 0, 0), 0.5), TORSO, (0, 0, 0), 1.2, 64),
-        sample(sphere((0, 0.6, 0.1), 0.3), HEAD, (0, 0.6, 0.1), 0.72, 48),
-    ))  # fmt: skip
+    return Body(
+        (
+            sample(sphere((0, 0, 0), 0.5), TORSO, (0, 0, 0), 1.2, 64),
+            sample(sphere((0, 0.6, 0.1), 0.3), HEAD, (0, 0.6, 0.1), 0.72, 48),
+        )
+    )
 
 
 def balls_scene() -> FieldScene:

@@ -60,9 +60,13 @@ def write_shards(folder: Path, count: int = 12) -> None:
     for number, split in enumerate(("train", "valid-clips", "valid-characters")):
         made = drawings(count if split == "train" else 3, number)
         np.savez(
-            folder / f"{split}-00000.npz", picture=made.picture, labels=made.labels, depth=made.depth, uv=made.uv,
+            folder / f"{split}-00000.npz",
+            picture=made.picture,
+            labels=made.labels,
+            depth=made.depth,
+            uv=made.uv,
             joints=np.stack([joints() for _ in range(len(made))]),
-        )  # fmt: skip
+        )
 
 
 def joints() -> NDArray[np.float32]:

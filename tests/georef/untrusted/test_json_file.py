@@ -81,9 +81,13 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "round").symlink_to(tmp_path / "round")
     (tmp_path / "large").write_bytes(b" " * 101)
     for name, finding in {
-        "pipe": "no plain file", "zero": "no plain file", "": "a folder", "gone": "No such file", "round": "levels",
+        "pipe": "no plain file",
+        "zero": "no plain file",
+        "": "a folder",
+        "gone": "No such file",
+        "round": "levels",
         "large": "more than the 0 MB",
-    }.items():  # fmt: skip
+    }.items():
         with pytest.raises(PlacementError, match=finding) as caught:
             read_json(tmp_path / name, "give another", PlacementError, max_bytes=100)
         assert str(caught.value).endswith("; give another")

@@ -113,18 +113,24 @@ def test_lines_after_a_quote_that_does_not_close_are_rows(path):
         ("figure,height-m,height_m\n", "two columns height_m; remove or rename one of them"),
         ('figure,"lon\n', "a quote in its first line that does not close; close it"),
         ("figure,\0\n", "a NUL character in its first line; give a text file, as CSV UTF-8"),
-        ("figure," + "x" * 2 * MAX_RECORD, f"its first line is longer than {MAX_RECORD:,} characters; "
-         "give a table whose first line names the columns"),
+        (
+            "figure," + "x" * 2 * MAX_RECORD,
+            f"its first line is longer than {MAX_RECORD:,} characters; give a table whose first line names the columns",
+        ),
         ("figure" + "," * MAX_COLUMNS, "1,001 columns; give at most 1,000"),
         (b"figure,name\na.png,x\nb.png,M\xfcller\n", "line 3: byte 0xfc is not UTF-8; save the table as CSV UTF-8"),
         (b"fig\xfcre,name\n", "line 1: byte 0xfc is not UTF-8; save the table as CSV UTF-8"),
-        ("figure\na\ud800.png\n".encode("utf-16", "surrogatepass"),
-         "line 2: code unit 0xd800 is not UTF-16; save the table as CSV UTF-8"),
-        ("figure\na.png\n".encode("utf-16") + b"x",
-         "line 3 or one after it is not UTF-16; save the table as CSV UTF-8"),
+        (
+            "figure\na\ud800.png\n".encode("utf-16", "surrogatepass"),
+            "line 2: code unit 0xd800 is not UTF-16; save the table as CSV UTF-8",
+        ),
+        (
+            "figure\na.png\n".encode("utf-16") + b"x",
+            "line 3 or one after it is not UTF-16; save the table as CSV UTF-8",
+        ),
         ("figure\na.png\n".encode("utf-16-le"), "a NUL character in its first line; give a text file, as CSV UTF-8"),
     ],
-)  # fmt: skip
+)
 def test_files_that_are_no_table_are_refused_in_one_line(path, data, message):
     with pytest.raises(InputError) as refused:
         rows_of(path, data)

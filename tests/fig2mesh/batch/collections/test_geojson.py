@@ -105,6 +105,7 @@ def test_points_give_places_where_properties_give_none(path, parser):
 
 LINE = {"type": "LineString", "coordinates": [[i, i] for i in range(5_000)]}
 
+# fmt: off
 BAD_FEATURES = {
     feature(LINE): "its geometry is a LineString; give a Point, or columns lon and lat",
     feature({"type": "GeometryCollection", "geometries": [POINT]}):
@@ -141,7 +142,8 @@ BAD_FEATURES = {
     '{"properties": {"figure": "a"}}': "no type where a Feature is expected; give features",
     "null": "no object where a Feature is expected; give features",
     "[[1], {}]": "no object where a Feature is expected; give features",
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.mark.parametrize("bad", BAD_FEATURES, ids=lambda bad: bad[:40])
@@ -233,6 +235,7 @@ def test_other_reference_systems_are_refused_before_a_row_is_read(path, parser, 
 
 JSON = "give valid JSON in UTF-8, with null for NaN"
 
+# fmt: off
 BROKEN = {
     document(feature(POINT))[:-2]: f"after feature 1, not JSON (*); {JSON}",
     document(feature(POINT), feature(a=1).replace("1", "NaN")): f"after feature 1, not JSON (*); {JSON}",
@@ -259,7 +262,8 @@ BROKEN = {
     document(feature(POINT)).encode("utf-16-le"): "UTF-16, or no text; save it as UTF-8",
     document(feature(name="é")).encode().replace(rb"\u00e9", b"\xe9"):
         f"not JSON (*); {JSON}",
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.mark.parametrize("text", BROKEN, ids=lambda text: repr(text[:30]))

@@ -60,14 +60,29 @@ def test_columns_of_every_type_are_as_gdal_reads_them(path):
     assert (first.where, second.where) == ("fid 1", "fid 2")
     assert (first.problem, second.problem) == (None, None)
     assert dict(first.values) == {
-        "figure": "a.png", "whole": 1, "long": 2**63 - 1, "short": 1, "real": 1.5, "single": float(np.float32(0.1)),
-        "truth": True, "day": "2024-02-29", "moment": "2024-02-29T12:34:56.789", "text": "Ä\n'\"",
-        "lon": 8.5, "lat": 47.25,
-    }  # fmt: skip
+        "figure": "a.png",
+        "whole": 1,
+        "long": 2**63 - 1,
+        "short": 1,
+        "real": 1.5,
+        "single": float(np.float32(0.1)),
+        "truth": True,
+        "day": "2024-02-29",
+        "moment": "2024-02-29T12:34:56.789",
+        "text": "Ä\n'\"",
+        "lon": 8.5,
+        "lat": 47.25,
+    }
     assert dict(second.values) == {
-        "figure": "b.png", "whole": -(2**31), "long": -(2**63), "short": 2, "real": -0.25, "truth": False,
-        "day": "1900-01-01", "moment": "1900-01-01T00:00:00",
-    }  # fmt: skip
+        "figure": "b.png",
+        "whole": -(2**31),
+        "long": -(2**63),
+        "short": 2,
+        "real": -0.25,
+        "truth": False,
+        "day": "1900-01-01",
+        "moment": "1900-01-01T00:00:00",
+    }
     assert [type(first.values[name]) for name in ("whole", "real", "truth")] == [int, float, bool]
     meta, _, _, fields = pyogrio.raw.read(path)
     for name, values in zip(meta["fields"], fields, strict=True):
@@ -157,8 +172,11 @@ MULTI = b"\1\4\0\0\0"
     ("shape", "problem", "place"),
     [
         (POLYGON, "its geometry is a Polygon; give a Point, or columns lon and lat", None),
-        (MULTI + b"\2\0\0\0" + wkb(1, 2) * 2, "its geometry is a MultiPoint of 2; give a Point, or columns lon and lat",
-         None),
+        (
+            MULTI + b"\2\0\0\0" + wkb(1, 2) * 2,
+            "its geometry is a MultiPoint of 2; give a Point, or columns lon and lat",
+            None,
+        ),
         (MULTI + b"\1\0\0\0" + wkb(1, 2), None, (1, 2)),
         (MULTI + b"\0\0\0\0", None, None),
         (wkb(np.nan, np.nan), None, None),
@@ -171,7 +189,7 @@ MULTI = b"\1\4\0\0\0"
         (b"\1\1\0\0\0", "a geometry that cannot be read; write the layer again", None),
         (b"", "a geometry that cannot be read; write the layer again", None),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("envelope", [0, 1, 2, 4])
 def test_shapes(path, shape, problem, place, envelope):
     write_layer(path, {"figure": texts("a.png")}, [wkb(1, 2)])

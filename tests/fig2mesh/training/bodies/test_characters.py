@@ -46,20 +46,26 @@ def _ball(centre: Any, radius: float) -> tuple[NDArray[np.float64], NDArray[np.i
 def _limbs() -> dict[str, tuple[list[float], list[float], float]]:
     """Bone → where it starts and ends, and how thick it is, of a stick man 2 m wide."""
     limbs: dict[str, tuple[list[float], list[float], float]] = {
-        "Hips": ([0, 1.0, 0], [0, 1.1, 0], 0.14), "Abdomen": ([0, 1.1, 0], [0, 1.2, 0], 0.14),
-        "Torso": ([0, 1.2, 0], [0, 1.3, 0], 0.14), "Chest": ([0, 1.3, 0], [0, 1.5, 0], 0.14),
-        "Neck": ([0, 1.5, 0], [0, 1.6, 0], 0.06), "Head": ([0, 1.6, 0], [0, 1.8, 0], 0.12),
-    }  # fmt: skip
+        "Hips": ([0, 1.0, 0], [0, 1.1, 0], 0.14),
+        "Abdomen": ([0, 1.1, 0], [0, 1.2, 0], 0.14),
+        "Torso": ([0, 1.2, 0], [0, 1.3, 0], 0.14),
+        "Chest": ([0, 1.3, 0], [0, 1.5, 0], 0.14),
+        "Neck": ([0, 1.5, 0], [0, 1.6, 0], 0.06),
+        "Head": ([0, 1.6, 0], [0, 1.8, 0], 0.12),
+    }
     for side, s in (("L", 1), ("R", -1)):
         for bone, first, last, radius in (
-            ("Shoulder", [0.02, 1.42, 0], [0.15, 1.42, 0], 0.05), ("UpperArm", [0.15, 1.42, 0], [0.4, 1.42, 0], 0.05),
-            ("LowerArm", [0.4, 1.42, 0], [0.65, 1.42, 0], 0.045), ("Hand", [0.65, 1.42, 0], [0.75, 1.42, 0], 0.04),
+            ("Shoulder", [0.02, 1.42, 0], [0.15, 1.42, 0], 0.05),
+            ("UpperArm", [0.15, 1.42, 0], [0.4, 1.42, 0], 0.05),
+            ("LowerArm", [0.4, 1.42, 0], [0.65, 1.42, 0], 0.045),
+            ("Hand", [0.65, 1.42, 0], [0.75, 1.42, 0], 0.04),
             ("Index1", [0.75, 1.42, 0.04], [0.82, 1.42, 0.04], 0.014),
             ("Middle1", [0.75, 1.42, 0.0], [0.82, 1.42, 0], 0.014),
             ("Pinky1", [0.75, 1.42, -0.04], [0.82, 1.42, -0.04], 0.014),
-            ("UpperLeg", [0.1, 1.0, 0], [0.1, 0.5, 0], 0.08), ("LowerLeg", [0.1, 0.5, 0], [0.1, 0.04, 0], 0.06),
+            ("UpperLeg", [0.1, 1.0, 0], [0.1, 0.5, 0], 0.08),
+            ("LowerLeg", [0.1, 0.5, 0], [0.1, 0.04, 0], 0.06),
             ("Foot", [0.1, 0.04, 0], [0.1, 0.04, 0.16], 0.05),
-        ):  # fmt: skip
+        ):
             limbs[f"{bone}.{side}"] = ([s * first[0], *first[1:]], [s * last[0], *last[1:]], radius)
     return limbs
 
@@ -67,10 +73,20 @@ def _limbs() -> dict[str, tuple[list[float], list[float], float]]:
 def _parent(bone: str) -> str:
     stem, dot, side = bone.partition(".")
     above = {
-        "Abdomen": "Hips", "Torso": "Abdomen", "Chest": "Torso", "Neck": "Chest", "Head": "Neck", "Shoulder": "Chest",
-        "UpperArm": "Shoulder", "LowerArm": "UpperArm", "Hand": "LowerArm", "UpperLeg": "Root",
-        "LowerLeg": "UpperLeg", "Foot": "LowerLeg", "Hips": "Root",
-    }.get(stem, "Hand")  # fmt: skip
+        "Abdomen": "Hips",
+        "Torso": "Abdomen",
+        "Chest": "Torso",
+        "Neck": "Chest",
+        "Head": "Neck",
+        "Shoulder": "Chest",
+        "UpperArm": "Shoulder",
+        "LowerArm": "UpperArm",
+        "Hand": "LowerArm",
+        "UpperLeg": "Root",
+        "LowerLeg": "UpperLeg",
+        "Foot": "LowerLeg",
+        "Hips": "Root",
+    }.get(stem, "Hand")
     return above + dot + side if above not in ("Chest", "Hips", "Root", "Abdomen", "Torso", "Neck") else above
 
 
@@ -114,22 +130,32 @@ def _write_stick_man(path: Path) -> None:
             weight = np.zeros((len(x), 4), "<f4")
             # The hips come without weights, as the legs of one file do.
             weight[:, 0] = np.nan if bone == "Hips" else 1.0
-            primitives.append({
-                "attributes": {
-                    "POSITION": put(x.astype("<f4"), "VEC3", 5126), "JOINTS_0": put(joint, "VEC4", 5123),
-                    "WEIGHTS_0": put(weight, "VEC4", 5126),
-                },
-                "indices": put(faces.reshape(-1, 1).astype("<u4"), "SCALAR", 5125), "material": int(of_head),
-            })  # fmt: skip
+            primitives.append(
+                {
+                    "attributes": {
+                        "POSITION": put(x.astype("<f4"), "VEC3", 5126),
+                        "JOINTS_0": put(joint, "VEC4", 5123),
+                        "WEIGHTS_0": put(weight, "VEC4", 5126),
+                    },
+                    "indices": put(faces.reshape(-1, 1).astype("<u4"), "SCALAR", 5125),
+                    "material": int(of_head),
+                }
+            )
         meshes.append({"primitives": primitives})
         nodes.append({"name": piece, "mesh": len(meshes) - 1, "skin": 0})
     document = {
-        "asset": {"version": "2.0"}, "nodes": nodes, "skins": [skin], "meshes": meshes, "accessors": accessors,
-        "bufferViews": views, "buffers": [{"byteLength": len(binary)}],
+        "asset": {"version": "2.0"},
+        "nodes": nodes,
+        "skins": [skin],
+        "meshes": meshes,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(binary)}],
         "materials": [
-            {"name": "Red", "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.0, 0.214, 1.0]}}, {"name": "Skin"}
+            {"name": "Red", "pbrMetallicRoughness": {"baseColorFactor": [1.0, 0.0, 0.214, 1.0]}},
+            {"name": "Skin"},
         ],
-    }  # fmt: skip
+    }
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary

@@ -33,10 +33,12 @@ from fig2mesh.training.bodies.retarget import (
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE
 from fig2mesh.training.bodies.stances import stances
 
+# fmt: off
 LIMB_OFFSETS = {  # z up, facing -y, arms half way down: nothing that the canonical T-pose has
     "Arm": (1.5, 0, 0), "ForeArm": (2, 0, -2), "Hand": (1.5, -0.5, -2), "Shoulder": (0.5, 0, 2),
     "UpLeg": (1, 0, -0.5), "Leg": (0.3, 0, -4), "Foot": (0.2, 0.2, -4), "Toe": (0, -1, -0.3),
-}  # fmt: skip
+}
+# fmt: on
 TRUNK = ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head")
 
 
@@ -362,8 +364,23 @@ def test_missing_folder_is_named(tmp_path: Path) -> None:
 
 def test_bullet_motion(tmp_path: Path) -> None:
     """A figure at rest hangs its arms; hinges bend knees back and elbows ahead; other creatures give nothing."""
-    still = [0.03, 0, 0.9, 0, *([1.0, 0, 0, 0] * 3), *[1, 0, 0, 0], 0, *[1, 0, 0, 0], *[1, 0, 0, 0], 0,
-             *[1, 0, 0, 0], 0, *[1, 0, 0, 0], *[1, 0, 0, 0], 0]  # fmt: skip
+    still = [
+        0.03,
+        0,
+        0.9,
+        0,
+        *([1.0, 0, 0, 0] * 3),
+        *[1, 0, 0, 0],
+        0,
+        *[1, 0, 0, 0],
+        *[1, 0, 0, 0],
+        0,
+        *[1, 0, 0, 0],
+        0,
+        *[1, 0, 0, 0],
+        *[1, 0, 0, 0],
+        0,
+    ]
     bent = list(still)
     bent[4 + 16] = -1.0  # right knee
     bent[-1] = 1.0  # left elbow

@@ -51,17 +51,26 @@ def test_a_straight_cut_is_closed_by_a_flat_cap() -> None:
     i, j = np.meshgrid(np.arange(2), np.arange(16), indexing="ij")
     a, b, c, d = (16 * (i + p) + (j + q) % 16 for p, q in ((0, 0), (0, 1), (1, 0), (1, 1)))
     k = np.arange(16)
-    faces = np.concatenate([
-        np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3),
-        np.stack([k, np.full(16, 48), (k + 1) % 16], 1), np.stack([32 + k, 32 + (k + 1) % 16, np.full(16, 49)], 1),
-    ])  # fmt: skip
+    faces = np.concatenate(
+        [
+            np.stack([a, b, d], -1).reshape(-1, 3),
+            np.stack([a, d, c], -1).reshape(-1, 3),
+            np.stack([k, np.full(16, 48), (k + 1) % 16], 1),
+            np.stack([32 + k, 32 + (k + 1) % 16, np.full(16, 49)], 1),
+        ]
+    )
     vertices = np.concatenate([*rings, [[-1.0, 0, 0], [1.0, 0, 0]]])
     right = vertices[faces][:, :, 0].mean(axis=1) > 0
     man = capsule_man("man")
     rig = replace(
-        man, vertices=vertices, faces=faces, face_part=np.where(right, PART["l_hand"], PART["torso"]),
-        face_material=0 * right, bone_index=np.zeros((50, 4), int), bone_weight=np.tile([1.0, 0, 0, 0], (50, 1)),
-    )  # fmt: skip
+        man,
+        vertices=vertices,
+        faces=faces,
+        face_part=np.where(right, PART["l_hand"], PART["torso"]),
+        face_material=0 * right,
+        bone_index=np.zeros((50, 4), int),
+        bone_weight=np.tile([1.0, 0, 0, 0], (50, 1)),
+    )
     halves = partition(rig, 0)
     assert [half.part for half in halves] == [PART["torso"], PART["l_hand"]]
     area = 16 / 2 * np.sin(2 * np.pi / 16)

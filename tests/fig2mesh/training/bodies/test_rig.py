@@ -14,8 +14,10 @@ from fig2mesh.skeleton import JOINT_MIRROR
 from fig2mesh.training.bodies.rig import KEY, KEY_MIRROR, KEYS, T_POSE, PoseSet, axis_angle, pose, swing
 from tests.fig2mesh.training.figures import NAMES, capsule_man, poses
 
+# fmt: off
 LIMBS = {"upper_arm": ("shoulder", "elbow"), "lower_arm": ("elbow", "wrist"),
-         "upper_leg": ("hip", "knee"), "lower_leg": ("knee", "ankle")}  # fmt: skip
+         "upper_leg": ("hip", "knee"), "lower_leg": ("knee", "ankle")}
+# fmt: on
 SIDES = [(side, limb) for side in "lr" for limb in LIMBS]
 STRAIGHT = np.zeros(2)
 

@@ -93,12 +93,14 @@ def _between(first: str, last: str) -> Callable[[Rig], float]:
     return lambda rig: float(np.linalg.norm(rig.joint_rest[JOINT[first]] - rig.joint_rest[JOINT[last]]))
 
 
+# fmt: off
 MEASURES = {
     "head": _alone("head", 1), "hand": _alone("l_finger", 2), "foot": _alone("r_foot", 0),
     "arm_length": _between("l_shoulder", "l_elbow"), "leg_length": _between("r_hip", "r_knee"),
     "arm_girth": _alone("r_lower_arm", 2), "leg_girth": _alone("l_upper_leg", 2),
     "torso_width": _alone("hips", 0), "torso_height": _between("thorax", "pelvis"), "torso_depth": _alone("hips", 2),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.mark.parametrize("name", MEASURES)

@@ -24,8 +24,15 @@ def seen() -> tuple[Layers, Face]:
 
 
 def style_with(seed: int = 0, **changes: object):
-    plain = {"background": "white", "slip": (0.0, 0.0), "wobble": 0.0, "broken": 0.0, "glaze": False,
-             "softness": 0.0, "speckle": 0.0}  # fmt: skip
+    plain = {
+        "background": "white",
+        "slip": (0.0, 0.0),
+        "wobble": 0.0,
+        "broken": 0.0,
+        "glaze": False,
+        "softness": 0.0,
+        "speckle": 0.0,
+    }
     return replace(random_style(MATERIALS, np.random.default_rng(seed)), **{**plain, **changes})
 
 
@@ -162,8 +169,13 @@ def test_every_fill_shrinks_to_a_picture(seen: tuple[Layers, Face]) -> None:
 
 
 def test_nothing_to_see_leaves_the_background() -> None:
-    empty = Layers(np.zeros((64, 64), np.uint8), np.full((64, 64), -1), np.zeros((64, 64, 2), np.float32),
-                   np.full((64, 64), -np.inf, np.float32), np.zeros((64, 64, 3), np.float32))  # fmt: skip
+    empty = Layers(
+        np.zeros((64, 64), np.uint8),
+        np.full((64, 64), -1),
+        np.zeros((64, 64, 2), np.float32),
+        np.full((64, 64), -np.inf, np.float32),
+        np.zeros((64, 64, 3), np.float32),
+    )
     for fill in FILLS:
         assert (draw(empty, MATERIALS, np.random.default_rng(1), style=style_with(fill=fill, width=1.0)) == 255).all()
 

@@ -17,18 +17,22 @@ from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sampler, Sk
 from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 from fig2mesh.training.networks.train_pose import pose_scores, train_pose
 
+# fmt: off
 PLACES = {
     "hips": (0, 0.95, 0), "spine1": (0, 1.05, 0), "spine2": (0, 1.15, 0), "spine3": (0, 1.25, 0), "neck": (0, 1.5, 0),
     "head": (0, 1.58, 0.02), "clavicle": (0.03, 1.42, 0), "upper_arm": (0.18, 1.42, 0), "lower_arm": (0.4, 1.25, 0),
     "hand": (0.6, 1.1, 0.03), "upper_leg": (0.09, 0.92, 0), "lower_leg": (0.11, 0.5, 0.01), "foot": (0.12, 0.09, -0.02),
-}  # fmt: skip
+}
+# fmt: on
+# fmt: off
 RIDES = {
     "head": ("head", (0, 0.1, 0)), "eyes": ("head", (0, 0.08, 0.1)), "neck": ("neck", (0, 0, 0)),
     "thorax": ("spine3", (0, 0.1, 0)), "pelvis": ("hips", (0, 0, 0)), "shoulder": ("upper_arm", (0, 0, 0)),
     "elbow": ("lower_arm", (0, 0, 0)), "wrist": ("hand", (0, 0, 0)), "hand": ("hand", (0.08, -0.05, 0)),
     "hip": ("upper_leg", (0, 0, 0)), "knee": ("lower_leg", (0, 0, 0)), "ankle": ("foot", (0, 0, 0)),
     "foot": ("foot", (0, -0.07, 0.14)),
-}  # fmt: skip
+}
+# fmt: on
 
 
 def rig(scale: float = 1.0, root: bool = True) -> Rig:
@@ -59,14 +63,22 @@ def rig(scale: float = 1.0, root: bool = True) -> Rig:
         joint_bone.append(names.index(key))
         joint_rest.append(place(key) + scale * np.array(offset) * [-1 if joint.startswith("r_") else 1, 1, 1])
     return Rig(
-        name="sticks", vertices=scale * np.array([[0, 0, 0], [0, 1.75, 0], [0.1, 0, 0]], np.float32),
-        faces=np.array([[0, 1, 2]], np.int32), face_part=np.array([1], np.uint8), face_material=np.zeros(1, np.uint8),
-        materials=("skin",), bone_index=np.zeros((3, 4), np.int32), bone_weight=np.full((3, 4), 0.25, np.float32),
-        parents=np.array(parents, np.int32), heads=np.array(heads, np.float32),
-        key_bone=np.array([names.index(key) for key in KEYS], np.int32), rest_direction=direction.astype(np.float32),
-        finger_axis=np.zeros((len(names), 3), np.float32), joint_bone=np.array(joint_bone, np.int32),
+        name="sticks",
+        vertices=scale * np.array([[0, 0, 0], [0, 1.75, 0], [0.1, 0, 0]], np.float32),
+        faces=np.array([[0, 1, 2]], np.int32),
+        face_part=np.array([1], np.uint8),
+        face_material=np.zeros(1, np.uint8),
+        materials=("skin",),
+        bone_index=np.zeros((3, 4), np.int32),
+        bone_weight=np.full((3, 4), 0.25, np.float32),
+        parents=np.array(parents, np.int32),
+        heads=np.array(heads, np.float32),
+        key_bone=np.array([names.index(key) for key in KEYS], np.int32),
+        rest_direction=direction.astype(np.float32),
+        finger_axis=np.zeros((len(names), 3), np.float32),
+        joint_bone=np.array(joint_bone, np.int32),
         joint_rest=np.array(joint_rest, np.float32),
-    )  # fmt: skip
+    )
 
 
 def poses(count: int, seed: int = 0, amount: float = 0.7) -> PoseSet:
@@ -136,10 +148,14 @@ def test_perspective_enlarges_what_is_near(skeletons: Skeletons) -> None:
     assert (grown == (sample.joints[..., 2] > 0))[far].all()
 
 
-@pytest.mark.parametrize("shape", [
-    PoseLiftShape(width=64), PoseLiftShape(joints=16, perspective=True, metric=True, width=64),
-    PoseLiftShape(visibility=True, width=64),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "shape",
+    [
+        PoseLiftShape(width=64),
+        PoseLiftShape(joints=16, perspective=True, metric=True, width=64),
+        PoseLiftShape(visibility=True, width=64),
+    ],
+)
 def test_training_learns_and_is_stored(skeletons: Skeletons, tmp_path: Path, shape: PoseLiftShape) -> None:
     held = Skeletons.from_rigs([rig(0.95)], poses(16, seed=1))
     arguments = {"shape": shape, "batch": 64, "seed": 3}

@@ -101,8 +101,10 @@ def test_pictures_have_the_documented_shapes_and_show_the_parts(pack: Path, tmp_
         found = {name: (archive[name].shape, archive[name].dtype.name) for name in ("picture", "labels", "depth", "uv")}
         labels, depth = archive["labels"], archive["depth"]
     assert found == {
-        "picture": ((1, 4, 256, 256, 3), "uint8"), "labels": ((1, 4, 256, 256), "uint8"),
-        "depth": ((1, 4, 256, 256), "float16"), "uv": ((1, 4, 256, 256, 2), "float16"),
-    }  # fmt: skip
+        "picture": ((1, 4, 256, 256, 3), "uint8"),
+        "labels": ((1, 4, 256, 256), "uint8"),
+        "depth": ((1, 4, 256, 256), "float16"),
+        "uv": ((1, 4, 256, 256, 2), "float16"),
+    }
     np.testing.assert_array_equal(np.isfinite(depth), labels > 0)
     assert set(np.unique(labels)) >= {0, PART["torso"], PART["head"], PART["l_foot"], PART["r_foot"]}

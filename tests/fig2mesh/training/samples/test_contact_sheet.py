@@ -35,9 +35,13 @@ def shard(count: int, pictures: bool) -> dict[str, np.ndarray]:
                 frame = {"size": 64, "low": middle[:2] - e / 2, "pitch": e / 64}
                 masks[0, row, i] = coverage(turned, f[part == i + 1], **frame)
                 masks[1, row, i] = rasterise(turned, f, **frame).pick(part) == i + 1
-        row = {"joints": rng.uniform(-0.5, 0.5, (21, 3)), "centre": centre, "edge": edge,
-               "mask_amodal": np.packbits(masks[0], axis=-1),
-               "mask_visible": np.packbits(masks[1], axis=-1)}  # fmt: skip
+        row = {
+            "joints": rng.uniform(-0.5, 0.5, (21, 3)),
+            "centre": centre,
+            "edge": edge,
+            "mask_amodal": np.packbits(masks[0], axis=-1),
+            "mask_visible": np.packbits(masks[1], axis=-1),
+        }
         if pictures:
             seen = [look(model, view) for view in VIEW_YAW_DEG]
             row["picture"] = np.stack([draw(layers, MATERIALS, rng, face=face) for layers, face in seen])
@@ -64,8 +68,9 @@ def test_visible_masks_make_the_picture_of_the_labels() -> None:
     arrays = {name: value[0] for name, value in shard(1, False).items()}
     model = body(np.random.default_rng(0))
     for row, (view, yaw) in enumerate(VIEW_YAW_DEG.items()):
-        seen = rasterise(model["vertices"] @ axes(yaw).T, model["faces"], size=TILE, low=(-REACH, -REACH),
-                         pitch=2 * REACH / TILE).pick(model["face_part"])  # fmt: skip
+        seen = rasterise(
+            model["vertices"] @ axes(yaw).T, model["faces"], size=TILE, low=(-REACH, -REACH), pitch=2 * REACH / TILE
+        ).pick(model["face_part"])
         labels = compose(arrays["centre"], arrays["edge"], arrays["mask_visible"][row], view)
         # Two grids of different pitch differ along the parts' edges.
         assert (labels == seen).mean() > 0.985

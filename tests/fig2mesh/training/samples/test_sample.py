@@ -63,11 +63,16 @@ def cut(sample: Sample) -> Sample:
 
 def test_shapes_and_types_are_those_of_the_shards(sample: Sample) -> None:
     assert {name: (value.shape, value.dtype.name) for name, value in sample.arrays.items()} == {
-        "joints": ((21, 3), "float32"), "centre": ((14, 3), "float32"), "edge": ((14,), "float32"),
-        "size": ((14, 3), "float32"), "points": ((14, 2 * POINTS, 3), "float16"),
-        "distance": ((14, 2 * POINTS), "float16"), "mask_amodal": ((4, 14, 64, 8), "uint8"),
-        "mask_visible": ((4, 14, 64, 8), "uint8"), "grid": ((14, NODES, NODES, NODES), "float16"),
-    }  # fmt: skip
+        "joints": ((21, 3), "float32"),
+        "centre": ((14, 3), "float32"),
+        "edge": ((14,), "float32"),
+        "size": ((14, 3), "float32"),
+        "points": ((14, 2 * POINTS, 3), "float16"),
+        "distance": ((14, 2 * POINTS), "float16"),
+        "mask_amodal": ((4, 14, 64, 8), "uint8"),
+        "mask_visible": ((4, 14, 64, 8), "uint8"),
+        "grid": ((14, NODES, NODES, NODES), "float16"),
+    }
 
 
 def test_as_many_points_inside_as_outside_at_distances_of_the_mesh(sample: Sample) -> None:
