@@ -32,6 +32,7 @@ class Settings:
     textures : of unseen sides: as networks paint them, or plain colours of what is drawn before them; none at all
     contours : of the silhouette, if drawn: kept on the surface, or left to whoever shows the model
     light : clients light the surface; without, they show its colours as they are
+    normals : whether any output or effect needs shading normals, see `fig2mesh.convert.plan`
     device : "cpu" or "cuda"
     seed : of everything random
     """
@@ -50,6 +51,7 @@ class Settings:
     textures: Textures = "network"
     contours: Contours = "keep"
     light: bool = False
+    normals: bool = True
     device: str = "cpu"
     seed: int = 0
 
@@ -61,19 +63,6 @@ class Settings:
 
 EFFECTS = ("light", "none")
 """What the main job can be asked for by name; `fig2mesh render` has more."""
-
-STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "surface", "unwrap", "textures", "bake", "model")
-"""Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
-
-# fmt: off
-FIRST_USE = {
-    "parts": "lift", "part_nodes": "parts", "precision": "parts",
-    "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
-    "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
-    "normals": "surface", "textures": "unwrap", "contours": "textures", "light": "model",
-}
-# fmt: on
-"""Setting → the first stage that it changes; "normals": whether outputs or effects need them."""
 
 PRESETS: dict[Quality, Settings] = {
     "draft": Settings(canvas_px=256, voxel=0.01, part_nodes=24, spacing=0.012, triangles=6_000, texture_size=512),

@@ -6,14 +6,14 @@ import html
 import logging
 import shlex
 from pathlib import Path
-from typing import Any
 
 from fig2mesh.annotate.editing import Subject, begin
+from fig2mesh.annotate.request import AnnotateRequest
 from fig2mesh.annotate.server import annotation_server
-from fig2mesh.convert.job import configure_logging
+from fig2mesh.convert.request import HEIGHT_M
 from fig2mesh.errors import FigureError, OutputError
 from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, on_whole_picture, write_annotation
-from fig2mesh.settings import settings_for
+from fig2mesh.settings import Parts, settings_for
 from fig2mesh.view.job import scene_of
 from fig2mesh.view.page import view_page
 from fig2mesh.view.server import show
@@ -24,23 +24,9 @@ log = logging.getLogger("fig2mesh")
 PACKAGE = "fig2mesh.annotate"
 
 
-def run(
-    *,
-    figure: Path,
-    output: Path | None,
-    mask: Path | None,
-    keypoints: Path | None,
-    part_labels: Path | None,
-    bbox: tuple[int, int, int, int] | None,
-    parts: str,
-    port: int,
-    open_: bool,
-    quiet: bool,
-    verbose: int,
-) -> None:
-    """What `fig2mesh annotate FIGURE …` does; the parameters are the options of the command line."""
-    configure_logging(quiet, verbose)
-    folder = output if output is not None else Path(f"{figure.stem}_annotation")
+def run(request: AnnotateRequest) -> None:
+    """Do what `fig2mesh annotate` asks for."""
+    folder = request.folder
     if folder.exists() and not folder.is_dir():
         raise OutputError(folder, "is a file", "name a folder")
 
@@ -48,18 +34,19 @@ def run(
         # What was saved before goes on, unless an option names another file.
         return given if given is not None else folder / name if (folder / name).is_file() else None
 
-    subject, start = begin(figure, kept(mask, MASK), kept(keypoints, KEYPOINTS), kept(part_labels, PART_LABELS), bbox)
+    mask, labels = kept(request.mask, MASK), kept(request.part_labels, PART_LABELS)
+    subject, start = begin(request.figure, mask, kept(request.keypoints, KEYPOINTS), labels, request.bbox)
 
     def save(annotation: Annotation) -> str:
         whole = on_whole_picture(annotation, subject.corner, subject.size)
         write_annotation(folder, whole, subject.picture, overwrite=True)
-        log.info("%s", main_job(figure, folder, bbox))
+        log.info("%s", main_job(request.figure, folder, request.bbox))
         return f"saved in {folder}"
 
     def preview(annotation: Annotation) -> str:
-        return preview_page(subject, annotation, parts)
+        return preview_page(subject, annotation, request.parts)
 
-    show(annotation_server(page(subject), subject, start, save, preview, port), open_)
+    show(annotation_server(page(subject), subject, start, save, preview, request.port), request.open)
 
 
 def page(subject: Subject) -> str:
@@ -69,12 +56,12 @@ def page(subject: Subject) -> str:
     return filled("page.html", values, PACKAGE)
 
 
-def preview_page(subject: Subject, annotation: Annotation, parts: str) -> str:
+def preview_page(subject: Subject, annotation: Annotation, parts: Parts) -> str:
     """The page that shows the solid, of draft quality. Raises FigureError where there is none."""
     if not annotation.mask.any():
         raise FigureError(subject.picture, "the silhouette is empty", "paint it first")
-    settings: Any = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
-    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, 1.79))
+    settings = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
+    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, HEIGHT_M))
 
 
 def main_job(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:

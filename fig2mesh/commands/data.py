@@ -6,8 +6,6 @@ from pathlib import Path
 
 import click
 
-from fig2mesh.commands.evaluate import evaluate
-
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
@@ -115,9 +113,3 @@ def show(source: Path, out: Path, count: int, overwrite: bool) -> None:
     from fig2mesh.training.samples.contact_sheet import make_sheet
 
     make_sheet(source, out, count)
-
-
-def add_to(cli: click.Group) -> None:
-    """Make `data` and `evaluate` commands of `cli`."""
-    cli.add_command(data)
-    cli.add_command(evaluate)

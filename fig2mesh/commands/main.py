@@ -1,31 +1,50 @@
-"""The command line: a skin over `fig2mesh.convert.job`; data on stdout, progress and messages on stderr.
+"""The command line: one file a command; data on stdout, progress and messages on stderr.
 
 Nothing heavy is imported before it is needed: `fig2mesh --help` loads only click.
 """
 
 from __future__ import annotations
 
-import json
+import re
 import sys
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
 
 import click
 
 from fig2mesh import __version__
-from fig2mesh.commands import annotate as annotate_cli
-from fig2mesh.commands import batch as batch_cli
-from fig2mesh.commands import data as data_cli
-from fig2mesh.commands import globe as globe_cli
-from fig2mesh.commands import parse as parse_cli
-from fig2mesh.commands import render as render_cli
-from fig2mesh.commands import tileset as tileset_cli
-from fig2mesh.commands import train as training_cli
-from fig2mesh.commands import view as view_cli
-from fig2mesh.commands.options import FILE, figure_files, messages, place_options
+from fig2mesh.commands.annotate import annotate
+from fig2mesh.commands.batch import batch
+from fig2mesh.commands.data import data
+from fig2mesh.commands.doctor import doctor
+from fig2mesh.commands.evaluate import evaluate
+from fig2mesh.commands.globe import globe
+from fig2mesh.commands.inspect import inspect
+from fig2mesh.commands.make import make
+from fig2mesh.commands.parse import parse
+from fig2mesh.commands.plan import plan
+from fig2mesh.commands.render import render
+from fig2mesh.commands.tileset import tileset
 from fig2mesh.commands.tradeoff import tradeoff
-from fig2mesh.settings import EFFECTS
+from fig2mesh.commands.train import train
+from fig2mesh.commands.validate import validate
+from fig2mesh.commands.view import view
+from fig2mesh.convert.fields import request_fields
+from fig2mesh.convert.request import (
+    FigureFiles,
+    InferenceOptions,
+    MeshOptions,
+    OutputOptions,
+    PlaceRequest,
+)
+
+GROUPS = {
+    "Figure": FigureFiles,
+    "Place": PlaceRequest,
+    "Model": InferenceOptions,
+    "Mesh": MeshOptions,
+    "Output": OutputOptions,
+}
+"""Sections of the help, and the part of a request that each is about."""
 
 
 class MainJobGroup(click.Group):
@@ -49,10 +68,14 @@ class MainJobGroup(click.Group):
         formatter.write_usage("fig2mesh", "COMMAND [ARGS]...", "       ")
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        main_job = self.commands["make"]
-        records = [record for p in main_job.get_params(ctx) if (record := p.get_help_record(ctx)) is not None]
-        with formatter.section("Options of the main job"):
-            formatter.write_dl(records)
+        options = {option.name: option for option in self.commands["make"].get_params(ctx)}
+        sections = {title: [field.field for field in request_fields(part)] for title, part in GROUPS.items()}
+        grouped = {name for names in sections.values() for name in names}
+        sections["Messages"] = [name for name in options if name not in grouped]
+        for title, names in sections.items():
+            records = [record for name in names if (record := options[name].get_help_record(ctx)) is not None]
+            with formatter.section(title):
+                formatter.write_dl(records)
         self.format_commands(ctx, formatter)
 
 
@@ -70,174 +93,25 @@ def cli() -> None:
     """
 
 
-@cli.command("make", hidden=True)
-@click.argument("figure", type=FILE)
-@place_options
-@click.option(
-    "--altitude-mode",
-    type=click.Choice(["absolute", "clamp"]),
-    default="absolute",
-    show_default=True,
-    help="clamp: --altitude is above the terrain that a client shows, where the format can say so (CZML).",
-)
-@click.option(
-    "-o",
-    "--output",
-    "outputs",
-    multiple=True,
-    metavar="OUT",
-    help=".glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson, or a folder / tileset.json for 3D Tiles; repeatable. "
-    "Default: FIGURE's stem + .glb in the current folder.",
-)
-@click.option(
-    "--profile",
-    type=click.Choice(["cesiumjs", "cesiumjs-ktx2", "blender", "qgis", "omniverse"]),
-    help="Write for one client: cesiumjs compressed (also with KTX 2 texture), blender and qgis without extensions, "
-    "omniverse as binary USD. Default: what every client takes.",
-)
-@figure_files
-@click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
-@click.option("--triangles", type=click.IntRange(200, 2_000_000), metavar="N", help="Triangles of the finest mesh.")
-@click.option("--texture-size", type=click.IntRange(64, 8192), metavar="PX", help="Texels a side.")
-@click.option(
-    "--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles, USD)."
-)
-@click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
-@click.option(
-    "--tiles-version",
-    type=tileset_cli.TILES_VERSION,
-    default="1.1",
-    show_default=True,
-    help="Of 3D Tiles; 1.0: content as .b3dm, for older clients.",
-)
-@click.option(
-    "--parts",
-    type=click.Choice(["network", "outline"]),
-    default="network",
-    show_default=True,
-    help="What depths come from: networks, or rules and the outline alone.",
-)
-@click.option(
-    "--textures",
-    type=click.Choice(["network", "plain", "none"]),
-    help="Unseen sides as networks paint them (default), or in the plain colours of what is drawn before them (default "
-    "with --parts outline); or no texture at all.",
-)
-@click.option(
-    "--contours",
-    type=click.Choice(["keep", "drop"]),
-    default="keep",
-    show_default=True,
-    help="The line drawn around the figure: on the surface, like the drawing from the front and a dark band from the "
-    "side; or left away, for clients that draw silhouettes.",
-)
-@click.option(
-    "--effect",
-    "effects",
-    type=click.Choice(EFFECTS),
-    multiple=True,
-    help="light: clients light the surface (default without texture); none: they show it as it is. Repeatable.",
-)
-@click.option("--mesher", type=click.Choice(["ball-pivot", "isosurface"]), default="ball-pivot", show_default=True)
-@click.option("--closing", type=click.Choice(["pymeshlab", "fill"]), default="pymeshlab", show_default=True)
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True)
-@click.option("--name", metavar="TEXT", help="What the figure is called in the outputs; default: FIGURE's stem.")
-@click.option("--credit", default="", metavar="TEXT", help="Attribution, kept in the outputs.")
-@click.option(
-    "--evidence/--no-evidence",
-    default=True,
-    show_default=True,
-    help="Part names and how much of each the drawing showed, as glTF feature ids.",
-)
-@click.option("--save-stages", type=FILE, metavar="DIR", help="Keep what each stage made.")
-@click.option("--resume-from", metavar="STAGE", help="Start at STAGE with what --save-stages DIR holds.")
-@click.option("--report", type=FILE, metavar="JSON", help="Seconds, memory, measures, versions, hashes.")
-@click.option("--overwrite", is_flag=True, help="Replace existing outputs.")
-@messages
-def make(**options: Any) -> None:
-    """Make a 3D model of FIGURE."""
-    from fig2mesh.convert.job import run
-
-    run(**options)
-
-
-@cli.command("plan", params=[*make.params, click.Option(["--json", "as_json"], is_flag=True, help="One JSON object.")])
-def show_plan(as_json: bool, **options: Any) -> None:
-    """Print which stages and effects a request needs, and why; the options are those of the main job."""
-    from fig2mesh.convert.job import plan_of
-
-    planned = plan_of(**options)
-    if as_json:
-        click.echo(json.dumps(asdict(planned), indent=2))
-        return
-    for each in (*planned.stages, *planned.effects):
-        click.echo(f"{'run ' if each.runs else 'skip'}  {each.name:<9} {each.why}")
-
-
-@cli.command()
-@click.argument("files", type=FILE, nargs=-1, required=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
-def inspect(files: tuple[Path, ...], as_json: bool) -> None:
-    """Say what is in a GLB, tileset, USD, PLY or OBJ file."""
-    from exporters.inspect import inspect as look
-
-    facts = {str(path): look(path) for path in files}
-    if as_json:
-        click.echo(json.dumps(next(iter(facts.values())) if len(facts) == 1 else facts, indent=2))
-        return
-    for path, found in facts.items():
-        click.echo(path)
-        for key, value in found.items():
-            click.echo(f"  {key}: {value if not isinstance(value, dict | list) else json.dumps(value)}")
-
-
-@cli.command()
-@click.argument("files", type=FILE, nargs=-1, required=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
-def validate(files: tuple[Path, ...], as_json: bool) -> None:
-    """Check files against their specifications; exit code 2 where there are errors."""
-    from dataclasses import asdict
-
-    from exporters.validate import validate as check
-
-    findings = {str(path): check(path) for path in files}
-    if as_json:
-        click.echo(json.dumps({path: [asdict(f) for f in found] for path, found in findings.items()}, indent=2))
-    else:
-        for path, found in findings.items():
-            errors = sum(f.severity == "error" for f in found)
-            warnings = sum(f.severity == "warning" for f in found)
-            click.echo(f"{path}: {errors} errors, {warnings} warnings")
-            for f in found:
-                click.echo(f"  {f.severity}: {f.code}: {f.message} [{f.where}]")
-    if any(f.severity == "error" for found in findings.values() for f in found):
-        raise SystemExit(2)
-
-
-@cli.command()
-def doctor() -> None:
-    """Say whether everything that fig2mesh needs is there and works."""
-    from fig2mesh.libraries import examine
-
-    healthy = True
-    for name, fine, text in examine():
-        healthy &= fine
-        click.echo(f"{'ok  ' if fine else 'FAIL'} {name}: {text}")
-    if not healthy:
-        raise SystemExit(1)
-
-
-parse_cli.add_to(cli)
-render_cli.add_to(cli)
-view_cli.add_to(cli)
-batch_cli.add_to(cli, make)
-tileset_cli.add_to(cli)
-annotate_cli.add_to(cli)
-globe_cli.add_to(cli)
-data_cli.add_to(cli)
-training_cli.add_to(cli)
-cli.add_command(tradeoff)
+for command in (
+    make,
+    plan,
+    parse,
+    annotate,
+    render,
+    view,
+    batch,
+    tileset,
+    globe,
+    inspect,
+    validate,
+    tradeoff,
+    evaluate,
+    data,
+    train,
+    doctor,
+):
+    cli.add_command(command)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -270,10 +144,15 @@ def main(arguments: list[str] | None = None) -> int:
     except SystemExit as error:
         return error.code if isinstance(error.code, int) else 1
     except Exception as error:
-        if "-vv" in words or words.count("-v") > 1:
+        if verbosity(words) > 1:
             raise
         click.echo(f"fig2mesh: internal error: {type(error).__name__}: {error} (-vv shows where)", err=True)
         return 1
+
+
+def verbosity(words: Sequence[str]) -> int:
+    """How often --verbose is among the words of a command line."""
+    return sum(word.count("v") if re.fullmatch("-[qv]+", word) else word == "--verbose" for word in words)
 
 
 if __name__ == "__main__":

@@ -1,107 +1,82 @@
-"""Options that every command has which starts from a drawing; click alone is imported."""
+"""Options of commands, read from the fields of their requests; click alone is imported."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+import functools
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 
+from fig2mesh.convert.fields import RequestField, request_fields
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 FILE = click.Path(path_type=Path)
 
-HEIGHT_M = 1.79
-"""Height of a figure where nothing is said of it, metres."""
 
-TRANSFORMS = ("auto", "helmert", "affine", "poly1", "poly2", "poly3", "tps", "projective")
-"""Those of `georef.mapsheet`, whose import takes longer than --help may."""
+def request_options(request: type, without: Collection[str] = ()) -> Callable[[F], Callable[..., Any]]:
+    """Decorator that gives a command the options of a request's fields.
+
+    The function gets the request as its first argument, and the values of its other options by name.
+
+    without : names of fields that the command does not offer; they have their defaults
+    """
+    fields = [field for field in request_fields(request) if field.field not in without]
+
+    def decorate(function: F) -> Callable[..., Any]:
+        @functools.wraps(function)
+        def command(*args: Any, **values: Any) -> Any:
+            return function(*args, request(**{field.field: values.pop(field.field) for field in fields}), **values)
+
+        # The one applied last is listed first; arguments stand where they are defined.
+        for field in reversed(fields):
+            command = parameter_of(field)(command)
+        return command
+
+    return decorate
 
 
-def figure_files(command: F) -> F:
-    """What belongs to the picture of a figure: silhouette, joints, parts, and where it is."""
-    silhouette = "Silhouette, bright on dark; default: the alpha channel, or inferred."
-    options = (
-        click.option("--mask", type=FILE, metavar="PNG", help=silhouette),
-        click.option("--keypoints", type=FILE, metavar="JSON", help="The 21 joints; default: inferred."),
-        click.option("--part-labels", type=FILE, metavar="PNG", help="Part label of every pixel."),
-        click.option(
-            "--bbox", type=int, nargs=4, metavar="X0 Y0 X1 Y1", help="Part of the picture that holds the figure."
-        ),
+def parameter_of(field: RequestField) -> Callable[[F], F]:
+    """The decorator that makes a field an option, or an argument, of a command."""
+    facts, kind = field.option, field.type
+    if facts.argument:
+        return click.argument(field.field, type=value_type(field), metavar=facts.metavar or None)
+    names = [field.field, f"{field.flag}/--no-{field.flag[2:]}" if field.default is True else field.flag]
+    if facts.short:
+        names.insert(1, f"-{facts.short}")
+    if kind.kind is bool:
+        shown = {"show_default": True} if field.default else {"is_flag": True}
+        return click.option(*names, default=field.default, help=facts.help, **shown)
+    required = field.default is dataclasses.MISSING
+    show: Any = facts.default_text or (not required and field.default not in (None, "", ()))
+    return click.option(
+        *names,
+        type=value_type(field),
+        default=None if required else field.default,
+        required=required,
+        nargs=kind.count,
+        multiple=kind.many,
+        metavar=facts.metavar or None,
+        show_default=show,
+        help=facts.help,
     )
-    # The one applied last is listed first.
-    for option in reversed(options):
-        command = option(command)
-    return command
 
 
-def place_options(command: F) -> F:
-    """Where the figure stands, which way it looks and how large it is: `fig2mesh.convert.place.PlaceRequest`."""
-    options = (
-        click.option("--lonlat", type=float, nargs=2, metavar="LON LAT", help="Place on WGS 84, degrees."),
-        click.option(
-            "--map",
-            "map_sheet",
-            type=FILE,
-            metavar="SHEET",
-            help="Place from a georeferenced map instead: its picture with tags, a world file, .points or a IIIF "
-            "annotation beside it; or one of these files.",
-        ),
-        click.option(
-            "--at",
-            type=float,
-            nargs=2,
-            metavar="X Y",
-            help="Pixel of SHEET where the feet are; default: where they are drawn, if FIGURE is the sheet.",
-        ),
-        click.option(
-            "--size-from",
-            type=click.Choice(["height", "map"]),
-            default="height",
-            show_default=True,
-            help="map: as large on the globe as drawn on the map, in place of --height-m.",
-        ),
-        click.option(
-            "--map-transform",
-            type=click.Choice(TRANSFORMS),
-            default="auto",
-            show_default=True,
-            help="Fitted to control points; auto: as the file says, or affine.",
-        ),
-        click.option(
-            "--map-crs",
-            metavar="CRS",
-            help="Reference system of the sheet, such as EPSG:2056, where its files name none; for points in longitude "
-            "and latitude, the projection to fit in.",
-        ),
-        click.option(
-            "--facing",
-            default="viewer",
-            metavar="N|NE|…|DEG|viewer",
-            show_default=True,
-            help="Compass bearing of the nose; viewer: towards the reader of the map, south without --map.",
-        ),
-        click.option("--height-m", type=float, metavar="M", help=f"Height of the figure.  [default: {HEIGHT_M}]"),
-        click.option(
-            "--altitude",
-            type=float,
-            metavar="M",
-            default=0.0,
-            show_default=True,
-            help="Height of the feet.",
-        ),
-        click.option(
-            "--altitude-datum",
-            default="ellipsoid",
-            metavar="ellipsoid|egm96|GRIDFILE",
-            show_default=True,
-            help="What --altitude is measured from.",
-        ),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
+def value_type(field: RequestField) -> click.ParamType:
+    """The type of one value of a field."""
+    kind, low, high = field.type, field.option.low, field.option.high
+    if kind.choices:
+        return click.Choice(kind.choices)
+    if kind.kind is Path:
+        return FILE
+    if kind.kind is int and (low is not None or high is not None):
+        return click.IntRange(None if low is None else int(low), None if high is None else int(high))
+    if kind.kind is float and (low is not None or high is not None):
+        return click.FloatRange(low, high)
+    return {int: click.INT, float: click.FLOAT, bool: click.BOOL, str: click.STRING}[kind.kind]
 
 
 def messages(command: F) -> F:

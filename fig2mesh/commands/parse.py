@@ -1,47 +1,96 @@
-"""`fig2mesh parse`: silhouette, parts and joints from a picture; nothing heavy is imported before."""
+"""`fig2mesh parse`: silhouette, parts and joints from a picture; nothing heavy is imported before it runs."""
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Literal
 
 import click
 
-from fig2mesh.commands.options import FILE, figure_files, messages
+from fig2mesh.commands.options import messages, request_options
+from fig2mesh.convert.fields import option, request_class
+from fig2mesh.convert.request import FigureFiles
+from fig2mesh.errors import InputError, OutputError
+from fig2mesh.terminal import configure_logging, log, progress
+
+JointFormat = Literal["fig2mesh", "coco", "labelme", "supervisely"]
+
+
+@request_class
+class ParseRequest(FigureFiles):
+    """A picture, and what is to be found in it."""
+
+    output: Path = option(short="o", metavar="DIR", help="Folder for the three files.")
+    format: JointFormat = option(default="fig2mesh", help="Of keypoints.json; all of them the main job reads.")
+    all: bool = option(default=False, help="Find all figures of a sheet: figures.json and a folder each.")
+    smallest: float | None = option(
+        default=None,
+        low=16,
+        high=100_000,
+        metavar="PX",
+        help="With --all: height of the smallest figures; default: a tenth of the sheet's longer side.",
+    )
+    overwrite: bool = option(default=False, help="Replace existing files.")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.all and (self.mask, self.keypoints, self.part_labels, self.bbox) != (None,) * 4:
+            raise InputError("--all", "beside --mask, --keypoints, --part-labels or --bbox", "these are of one figure")
+        if self.smallest is not None and not self.all:
+            raise InputError("--smallest", "given without --all", "pass --all as well")
 
 
 @click.command()
-@click.argument("figure", type=FILE, metavar="IMAGE")
-@click.option("-o", "--output", type=FILE, required=True, metavar="DIR", help="Folder for the three files.")
-@click.option(
-    "--format",
-    "kind",
-    type=click.Choice(["fig2mesh", "coco", "labelme", "supervisely"]),
-    default="fig2mesh",
-    show_default=True,
-    help="Of keypoints.json; all of them the main job reads.",
-)
-@click.option("--all", "whole_sheet", is_flag=True, help="Find all figures of a sheet: figures.json and a folder each.")
-@click.option(
-    "--smallest",
-    type=click.FloatRange(16, 100_000),
-    metavar="PX",
-    help="With --all: height of the smallest figures; default: a tenth of the sheet's longer side.",
-)
-@figure_files
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@request_options(ParseRequest)
 @messages
-def parse(**options: Any) -> None:
-    """Find the figure in IMAGE: write keypoints.json, mask.png and part_labels.png.
+def parse(request: ParseRequest, quiet: bool, verbose: int) -> None:
+    """Find the figure in the picture FIGURE: write keypoints.json, mask.png and part_labels.png.
 
-    They are made for the whole IMAGE, to be corrected by hand and given to the main job as --keypoints, --mask and
+    They are made for the whole picture, to be corrected by hand and given to the main job as --keypoints, --mask and
     --part-labels; after --all with the --bbox that is said of each figure. What --mask, --keypoints or --part-labels
     give is kept, and only the rest is inferred.
     """
-    from fig2mesh.parse.job import run
+    configure_logging(quiet, verbose)
+    if request.output.exists() and not request.output.is_dir():
+        raise OutputError(request.output, "is no folder", "give -o a folder")
+    if request.all:
+        parse_sheet(request, quiet)
+    else:
+        parse_figure(request)
 
-    run(**options)
+
+def parse_figure(request: ParseRequest) -> None:
+    """Find one figure and write its three files."""
+    from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, write_annotation
+    from fig2mesh.parse.files import annotation_of
+    from fig2mesh.parse.read import read_parsed
+
+    there = [name for name in (KEYPOINTS, MASK, PART_LABELS) if (request.output / name).exists()]
+    if there and not request.overwrite:
+        raise OutputError(request.output / there[0], "exists", "pass --overwrite or another folder")
+    annotation = annotation_of(read_parsed(**request.reading(), labels=True))
+    for path in write_annotation(request.output, annotation, request.figure.name, request.format, request.overwrite):
+        log.info("%s", path)
 
 
-def add_to(cli: click.Group) -> None:
-    """Make `parse` a command of `cli`."""
-    cli.add_command(parse)
+def parse_sheet(request: ParseRequest, quiet: bool) -> None:
+    """Find all figures of a sheet and write a folder for each."""
+    from fig2mesh.parse.files import FIGURES, write_sheet
+    from fig2mesh.parse.picture import on_white, read_view
+
+    folder, sheet = request.output, request.figure
+    if (folder / FIGURES).exists() and not request.overwrite:
+        raise OutputError(folder / FIGURES, "exists", "pass --overwrite or another folder")
+    view = read_view(sheet, None)
+    # torch takes seconds to load: what can be refused has been.
+    from fig2mesh.parse.sheet import find_figures
+
+    with progress(quiet) as advance:
+        figures = find_figures(on_white(view.rgba), request.smallest, advance)
+    names = write_sheet(folder, figures, sheet.name, view.size, request.format, request.overwrite)
+    for name, figure in zip(names, figures, strict=True):
+        box = " ".join(map(str, figure.bbox))
+        doubts = f"; {'; '.join(figure.found.doubts)}" if figure.found.doubts else ""
+        log.info("%s: --bbox %s, confidence %.2f%s", folder / name, box, figure.confidence, doubts)
+    if not figures:
+        log.warning("%s: no figure is found; smaller ones are looked for with --smallest PX", sheet)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from fig2mesh.commands.options import FILE, messages
+from fig2mesh.terminal import configure_logging, log
 
 TILES_VERSION = click.Choice(["1.0", "1.1"])
 
@@ -49,15 +50,9 @@ def tileset(
     depth. Beside the tileset come index.geojson, a map of the figures, and figures.czml, which stands on terrain.
     """
     from exporters.tiles.gather import write_figures
-    from fig2mesh.convert.job import configure_logging, log
 
     configure_logging(quiet, verbose)
     written = write_figures(
         assets, output, visible_from_m=visible_from, version=tiles_version, overwrite=overwrite, link=link
     )
     log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))
-
-
-def add_to(cli: click.Group) -> None:
-    """Make `tileset` a command of `cli`."""
-    cli.add_command(tileset)

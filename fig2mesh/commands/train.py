@@ -300,11 +300,6 @@ def parse(
     )
 
 
-def add_to(cli: click.Group) -> None:
-    """Make `train` a command of `cli`."""
-    cli.add_command(train)
-
-
 def _minutes(network: str, budget: float | None, epochs: int | None) -> float | None:
     return BUDGET_MIN[network] if budget is None and epochs is None else budget
 

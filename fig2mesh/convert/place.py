@@ -5,41 +5,24 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.commands.options import HEIGHT_M
+from fig2mesh.convert.request import HEIGHT_M, PlaceRequest
 from fig2mesh.errors import InputError
 from georef.bearing import parse_facing
 from georef.heights import ellipsoidal_height
-from georef.placement import AltitudeMode, GeoPlacement
+from georef.placement import GeoPlacement
 
 if TYPE_CHECKING:
     from fig2mesh.records import Figure
     from georef.mapsheet import MapSheet, SheetPlace
 
 
-@dataclass(frozen=True)
-class PlaceRequest:
-    """The options of `fig2mesh.commands.options.place_options`, as they are on the command line."""
-
-    lonlat: tuple[float, float] | None
-    facing: str
-    height_m: float | None
-    altitude: float
-    altitude_datum: str
-    map_sheet: Path | None = None
-    at: tuple[float, float] | None = None
-    size_from: str = "height"
-    map_transform: str = "auto"
-    map_crs: str | None = None
-    altitude_mode: AltitudeMode = "absolute"
-
-    @property
-    def somewhere(self) -> bool:
-        """Whether a place is asked for."""
-        return self.lonlat is not None or self.map_sheet is not None
+log = logging.getLogger("fig2mesh")
 
 
 @dataclass(frozen=True)
@@ -61,9 +44,18 @@ class Placed:
         return {"map": {key: self.map[key] for key in ("sheet", "pixel", "method", "rmse_m")}}
 
 
+def log_place(placed: Placed, *more: str | None) -> None:
+    """Log what the user is to know of a place."""
+    if placed.summary:
+        log.info("%s", placed.summary)
+    for note in (*placed.notes, *more):
+        if note:
+            log.warning("%s", note)
+
+
 def open_map(request: PlaceRequest) -> MapSheet | None:
     """Check the options of a place, and read the sheet that they name, if any."""
-    if request.map_sheet is None:
+    if request.map is None:
         for name, given in (("--at", request.at), ("--map-crs", request.map_crs)):
             if given is not None:
                 raise InputError(name, "given without a map", "pass --map SHEET as well")
@@ -80,7 +72,7 @@ def open_map(request: PlaceRequest) -> MapSheet | None:
     placement_of(request, (0.0, 0.0), dry=True)
     from georef.mapsheet import read_sheet
 
-    return read_sheet(request.map_sheet, transform=request.map_transform, map_crs=request.map_crs)
+    return read_sheet(request.map, transform=request.map_transform, map_crs=request.map_crs)
 
 
 def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: Path) -> Placed:
@@ -114,7 +106,7 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
     return Placed(placement, height, record, tuple(notes), _summary(sheet, spot))
 
 
-def clamp_note(request: PlaceRequest, targets: tuple[str, ...]) -> str | None:
+def clamp_note(request: PlaceRequest, targets: Sequence[str]) -> str | None:
     """One line on outputs that cannot follow terrain, where that is asked for."""
     if request.altitude_mode != "clamp":
         return None
@@ -160,7 +152,7 @@ def placement_of(
 def _record(request: PlaceRequest, sheet: MapSheet, spot: SheetPlace, pixel: tuple[float, float]) -> dict[str, Any]:
     """What the report says of the map; lengths in metres on the ground."""
     quality = sheet.quality
-    assert request.map_sheet is not None
+    assert request.map is not None
     return {
         "sheet": (sheet.picture or sheet.file).name,
         "georeference": sheet.file.name,

@@ -1,7 +1,4 @@
-"""Which stages and effects a request needs, and why the others are left out.
-
-Pure: the main job runs what `plan` says, and `fig2mesh plan` prints it.
-"""
+"""Which stages and effects a request needs, and why the others are left out."""
 
 from __future__ import annotations
 
@@ -10,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Final
 
-from fig2mesh.settings import STAGES, Settings
-
-COLOURING: Final = ("unwrap", "textures", "bake")
-"""Stages that figures without texture do not need."""
+from fig2mesh.settings import Settings
+from fig2mesh.stages.stage import Stage
+from fig2mesh.stages.table import STAGES
 
 WITH_NORMALS: Final = (".usd", ".usda", ".usdc", ".usdz", ".ply", ".obj")
 """Formats whose files have normals in any case: their readers light everything."""
@@ -35,39 +31,21 @@ class Plan:
     stages: tuple[Planned, ...]
     effects: tuple[Planned, ...]
 
-    @property
-    def normals(self) -> bool:
-        """Whether the model has shading normals."""
-        return any(effect.runs for effect in self.effects if effect.name == "normals")
 
-
-def plan(settings: Settings, outputs: Sequence[str]) -> Plan:
+def plan(settings: Settings, outputs: Sequence[str], stages: Sequence[Stage] = STAGES) -> Plan:
     """What a request needs.
 
     outputs : as `-o` takes them
     """
-    networks, inferred = settings.parts == "network", settings.textures == "network"
-    reasons = {
-        "lift": "depths of the joints, " + ("by the pose network" if networks else "by rule"),
-        "parts": "part fields, " + ("by the part networks in the drawn outline" if networks else "of the outline"),
-        "body": "the parts together",
-        "cloud": "points for ball pivoting",
-        "solid": f"the closed mesh, by {settings.mesher}",
-        "simplify": f"{settings.triangles} triangles" + (f", {settings.lods} levels" if settings.lods > 1 else ""),
-        "surface": "normals, parts and deviation of the simplified mesh",
-        "unwrap": "texture coordinates",
-        "textures": "colours of unseen sides, " + ("by two networks" if inferred else "those in front of them"),
-        "bake": f"a texture of {settings.texture_size} texels a side",
-        "model": "metres, on the ground",
-    }
-    without = dict.fromkeys(COLOURING, "no texture is asked for") if settings.textures == "none" else {}
-    if settings.mesher == "isosurface":
-        without["cloud"] = "the isosurface needs no points"
-    stages = tuple(Planned(name, name not in without, without.get(name, reasons[name])) for name in STAGES)
-    return Plan(stages, (_normals(settings, outputs), _light(settings)))
+    found = []
+    for stage in stages:
+        left_out = stage.left_out(settings)
+        found.append(Planned(stage.name, left_out is None, left_out or stage.why(settings)))
+    return Plan(tuple(found), (normals_of(settings, outputs), _light(settings)))
 
 
-def _normals(settings: Settings, outputs: Sequence[str]) -> Planned:
+def normals_of(settings: Settings, outputs: Sequence[str]) -> Planned:
+    """Whether the model needs shading normals; outputs : as `-o` takes them."""
     if settings.light:
         return Planned("normals", True, "for the effect light")
     formats = sorted({suffix for output in outputs if (suffix := PurePath(output).suffix.lower()) in WITH_NORMALS})

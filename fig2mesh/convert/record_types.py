@@ -56,3 +56,18 @@ def fits(value: Any, hint: Any) -> bool:
     if hint is int:
         return isinstance(value, int) and not isinstance(value, bool)
     return isinstance(value, type(None) if hint is None else hint)
+
+
+def records_in(hint: Any) -> dict[str, type]:
+    """Every record (dataclass) in values of an annotated type, by its name."""
+    found: dict[str, type] = {}
+    pending = [hint]
+    while pending:
+        each = pending.pop()
+        if isinstance(each, type) and dataclasses.is_dataclass(each):
+            if found.setdefault(each.__name__, each) is not each:
+                raise TypeError(f"two records are named {each.__name__}")
+            pending += [kind for kind in _hints(each).values() if kind not in found.values()]
+        else:
+            pending += get_args(each)
+    return found

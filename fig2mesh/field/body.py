@@ -83,6 +83,10 @@ class Body:
         """(N,) int32 index into `parts` of the part with the smallest distance; -1 without such parts."""
         return self.evaluate(points, with_parts=True)[1]
 
+    def nearest_labels(self, points: Any) -> ByteArray:
+        """(N,) uint8 label of the part nearest to each point (N, 3), FIGURE."""
+        return self.labels[self.nearest_part(points)]
+
     def gradient(self, points: Any) -> FloatArray:
         """(N, 3) float32 gradient of the distance at points (N, 3), FIGURE; about 1 long where the field is a distance.
 

@@ -6,12 +6,13 @@ import logging
 import os
 import secrets
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
-from fig2mesh.convert.job import configure_logging
 from fig2mesh.errors import OutputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
+from fig2mesh.globe.request import GlobeRequest
 from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.server import page_server, show
 
@@ -23,27 +24,21 @@ MARK = '<meta name="generator" content="fig2mesh globe">'
 
 
 def run(
-    *,
-    assets: tuple[Path, ...],
-    output: Path | None,
-    overlays: tuple[tuple[str, float, float, float, float], ...],
-    cesium: Path | None,
-    port: int,
-    open_: bool,
-    overwrite: bool,
-    quiet: bool,
-    verbose: int,
+    request: GlobeRequest, assets: Sequence[Path], overlays: Sequence[tuple[str, float, float, float, float]] = ()
 ) -> None:
-    """What `fig2mesh globe ASSET…` does; the parameters are the options of the command line."""
-    configure_logging(quiet, verbose)
+    """Do what `fig2mesh globe` asks for.
+
+    assets : files and folders of models; overlays : pictures, each with its west, south, east and north edge, degrees
+    """
+    output = request.output
     if output is not None:
-        _check_folder(output, overwrite)
+        _check_folder(output, request.overwrite)
     laid = tuple(Overlay(Path(image), *edges) for image, *edges in overlays)
-    found = find_assets(assets)
+    found = find_assets(tuple(assets))
     page, files = globe_page(found, laid), page_files(found, laid)
-    built = find_cesium(cesium, "globe")
+    built = find_cesium(request.cesium, "globe")
     if output is None:
-        show(page_server(page, port, {CESIUM: built}, files), open_)
+        show(page_server(page, request.port, {CESIUM: built}, files), request.open)
         return
     write_folder(output, page, files, built)
     size = sum(file.stat().st_size for file in output.rglob("*") if file.is_file())

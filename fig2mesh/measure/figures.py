@@ -12,19 +12,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from exporters.asset import TexturedMesh
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
-from fig2mesh.convert.pipeline import steps
+from fig2mesh.convert.convert import run_stages
 from fig2mesh.errors import InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.measure.bleed import bleed_share
 from fig2mesh.measure.front import flange_share, gap, look, wall_share
 from fig2mesh.measure.model import front_similarity, silhouette_iou
 from fig2mesh.measure.solid import laws, quality, thinnest_wall
-from fig2mesh.mesh.simplify import deviation, simplify
+from fig2mesh.mesh.simplify import deviation
+from fig2mesh.mesh.simplify import simplify as simplify_mesh
 from fig2mesh.parse.read import read_figure
-from fig2mesh.parts.pieces import clean
 from fig2mesh.settings import Settings
+from fig2mesh.stages.lift import lift
+from fig2mesh.stages.model import model
+from fig2mesh.stages.simplify import simplify
+from fig2mesh.stages.solid import solid
 from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 LEVELS = 3
@@ -140,27 +143,25 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     """All measures of one drawing's model, by the keys of `COLUMNS`."""
     figure = read_figure(**drawing.arguments())
     settings = replace(settings, lods=LEVELS)
-    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
-    results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-    for step in steps(settings, FIGURE_HEIGHT):
-        results[step.name] = step.run(*(results[name] for name in step.needs))
-    levels: tuple[TexturedMesh, ...] = results["model"]
-    model, solid = levels[0], results["solid"].mesh
+    done = run_stages(figure, settings, (lift, solid, simplify, model), height_m=FIGURE_HEIGHT)
+    figure, pieces = done.figure, done.pieces
+    levels = done.results[model]
+    finest, mesh = levels[0], done.results[solid].mesh
 
     frame = image_frame(figure)
-    asset = asset_from_figure(results["lift"], results["simplify"][0].vertices, FIGURE_HEIGHT)
+    asset = asset_from_figure(done.results[lift], done.results[simplify][0].vertices, FIGURE_HEIGHT)
     pixel, origin_px = on_drawing(frame, asset)
-    similar = front_similarity(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    missing = gap(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    front, wall, shape, law = look(model), thinnest_wall(model), quality(model), laws(model)
+    similar = front_similarity(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    missing = gap(finest, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    front, wall, shape, law = look(finest), thinnest_wall(finest), quality(finest), laws(finest)
     # FIGURE units are metres at this height.
-    deviations = [level.deviation_m for level in levels] + [deviation(simplify(solid, COARSE), solid)]
+    deviations = [level.deviation_m for level in levels] + [deviation(simplify_mesh(mesh, COARSE), mesh)]
     names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
     return {
-        "silhouette_iou": silhouette_iou(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
+        "silhouette_iou": silhouette_iou(finest, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
         "front_psnr_db": similar.psnr_db,
         "front_ssim": similar.ssim,
-        "bleed_share": bleed_share(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
+        "bleed_share": bleed_share(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
         "gap_share": missing.share,
         "gap_radius_mm": missing.radius_mm,
         "flange_share": flange_share(front),

@@ -101,4 +101,4 @@ def _traced(body: Body, spacing: float, tolerance: float) -> FloatArray:
 def _labels(body: Any, points: NDArray[np.float32]) -> ByteArray:
     if not isinstance(body, Body) or len(points) == 0:
         return np.zeros(len(points), np.uint8)
-    return body.labels[body.nearest_part(points)]
+    return body.nearest_labels(points)

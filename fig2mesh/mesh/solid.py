@@ -12,7 +12,7 @@ from fig2mesh.mesh.close import CloseReport, close
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.topology import check_solid, component_areas, face_components, select_faces
 from fig2mesh.records import Mesh, PointCloud
-from fig2mesh.settings import Settings
+from fig2mesh.settings import Closing
 
 CRUMB = 0.01
 """Components beyond the drawn pieces are dropped where they have less than this share of the surface."""
@@ -47,29 +47,29 @@ class Solid:
     how: Meshing
 
 
-def make_solid(cloud: PointCloud | None, body: Body, settings: Settings, pieces: int) -> Solid:
-    """Mesh a body; `cloud` is its scan for ball pivoting, None for the isosurface.
+def make_solid(cloud: PointCloud | None, body: Body, pieces: int, *, spacing: float, closing: Closing) -> Solid:
+    """Mesh a body; `cloud` is its scan for ball pivoting, points `spacing` apart; None for the isosurface.
 
     The drawing has `pieces` pieces and so has the solid: where ball pivoting bridges a narrow gap between two of them,
     the isosurface replaces it.
     """
     if cloud is None:
-        return _by_isosurface(body, settings, pieces, "")
-    closed, report = close(ball_pivot(cloud, settings.spacing), body, method=settings.closing)
+        return _by_isosurface(body, spacing, pieces, "")
+    closed, report = close(ball_pivot(cloud, spacing), body, method=closing)
     mesh, crumbs = _without_crumbs(closed, pieces)
     found = check_solid(mesh)
     if found.solid and found.components == pieces:
         mesher = "isosurface" if report.method == "isosurface" else "ball-pivot"
         return Solid(mesh, Meshing(mesher, report, found.components, crumbs, report.fallback))
     reason = f"ball pivoting made {found.components} components of {pieces} drawn pieces"
-    other = _by_isosurface(body, settings, pieces, reason)
+    other = _by_isosurface(body, spacing, pieces, reason)
     if found.solid and other.how.components != pieces:
         return Solid(mesh, Meshing("ball-pivot", report, found.components, crumbs, reason))
     return other
 
 
-def _by_isosurface(body: Body, settings: Settings, pieces: int, note: str) -> Solid:
-    mesh, crumbs = _without_crumbs(isosurface(body, spacing=ISOSURFACE_SPACING * settings.spacing), pieces)
+def _by_isosurface(body: Body, spacing: float, pieces: int, note: str) -> Solid:
+    mesh, crumbs = _without_crumbs(isosurface(body, spacing=ISOSURFACE_SPACING * spacing), pieces)
     return Solid(mesh, Meshing("isosurface", None, check_solid(mesh).components, crumbs, note))
 
 

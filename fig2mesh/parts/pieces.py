@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from PIL import Image
@@ -20,8 +21,16 @@ BAND_PX = 512
 """Rows that are reduced at a time."""
 
 
-def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]:
-    """The figure without specks that no grid could hold, the number of pieces kept and of specks dropped.
+class CleanFigure(NamedTuple):
+    """A figure without specks that no grid could hold, the number of pieces kept and of specks dropped."""
+
+    figure: Figure
+    pieces: int
+    specks: int
+
+
+def clean(figure: Figure, voxel: float, most_px: int) -> CleanFigure:
+    """Drop specks, and cut the picture down to what the stages need.
 
     Pieces are 8-connected. The largest one is always kept. The picture is cut down to the silhouette and the joints,
     so that nothing that follows depends on how much of a sheet lies around the figure, and reduced to about `most_px`
@@ -60,7 +69,7 @@ def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]
         origin_px=corner,
         step_px=figure.step_px * max(factor, 1),
     )
-    return cut, int(kept.sum()), int((~kept).sum())
+    return CleanFigure(cut, int(kept.sum()), int((~kept).sum()))
 
 
 def _reduced(rgba: ByteArray, factor: int) -> ByteArray:

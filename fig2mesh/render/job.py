@@ -12,20 +12,26 @@ from typing import Any
 
 from PIL import ImageColor
 
-from fig2mesh.convert.asset import torch_device
-from fig2mesh.convert.job import check_text, configure_logging, write_text
+from fig2mesh.convert.convert import run_stages
+from fig2mesh.convert.text_file import check_text, write_text
 from fig2mesh.errors import FigureError, InputError
+from fig2mesh.image_frame import image_frame
 from fig2mesh.parse.read import read_figure
+from fig2mesh.parts.smooth_union import smooth_union
 from fig2mesh.records import ByteArray, Figure
 from fig2mesh.render.counts import Counts
-from fig2mesh.render.effects import Effect, Mode, check_effects, parse_effects
+from fig2mesh.render.effects import Effect, check_effects, parse_effects
 from fig2mesh.render.images_out import KINDS, check_pictures, kind_of, write_pictures
 from fig2mesh.render.model import SUFFIXES, read_model
 from fig2mesh.render.needs import needs
 from fig2mesh.render.picture import Request, render, view_of
+from fig2mesh.render.request import RenderRequest
 from fig2mesh.render.scene import FieldScene, MeshScene, Scene
 from fig2mesh.render.sun import Sun, parse_time, sun_at, towards_sun
-from fig2mesh.settings import Settings, settings_for
+from fig2mesh.settings import Settings
+from fig2mesh.stages.body import body
+from fig2mesh.stages.parts import parts
+from fig2mesh.stages.textures import textures
 from georef.bearing import parse_facing
 from georef.placement import check_lonlat
 
@@ -48,97 +54,64 @@ class _Total:
     pictures: int = 0
 
 
-def run(
-    *,
-    source: Path,
-    output: str,
-    mode: Mode,
-    effects: tuple[str, ...],
-    yaw: float,
-    pitch: float,
-    size: tuple[int, int],
-    samples: int | None,
-    background: str | None,
-    ground: bool,
-    outline_width: float,
-    outline_colour: str,
-    lonlat: tuple[float, float] | None,
-    time_: str | None,
-    facing: str,
-    frames: int | None,
-    fps: float | None,
-    seconds: float | None,
-    mask: Path | None,
-    keypoints: Path | None,
-    part_labels: Path | None,
-    bbox: tuple[int, int, int, int] | None,
-    quality: Any,
-    parts: str,
-    textures: str | None,
-    contours: str,
-    device: str,
-    seed: int,
-    report: Path | None,
-    overwrite: bool,
-    quiet: bool,
-    verbose: int,
-) -> None:
-    """What `fig2mesh render FIGURE …` does; the parameters are the options of the command line."""
-    configure_logging(quiet, verbose)
+def run(request: RenderRequest) -> None:
+    """Do what `fig2mesh render` asks for."""
     # Everything that can be refused is refused before the work begins.
-    wanted = parse_effects(effects)
-    fields = source.suffix.lower() not in SUFFIXES
-    check_effects(mode, wanted, fields=fields)
-    if not fields and (mask, keypoints, part_labels, bbox, textures) != (None,) * 5:
-        raise InputError(source, "is a finished model, which needs no --mask, --keypoints …", "leave them out")
-    sun = _sun(wanted, lonlat, time_)
-    bearing = parse_facing(facing)
-    kind = kind_of(output)
-    count, rate = _timing(KINDS[kind].moving, frames, fps, seconds, output)
-    paper = _background(background, KINDS[kind].transparent)
-    samples = samples or (1 if mode in ("depth", "parts") else 2)
-    if size[0] * size[1] * samples**2 > MOST_RAYS:
-        raise InputError("--size", f"{size[0]} {size[1]} with {samples} samples a side", "give less of either")
-    check_pictures(output, overwrite, size, paper is None)
-    if report is not None:
-        check_text(report, overwrite)
+    wanted = parse_effects(request.effects)
+    fields = request.figure.suffix.lower() not in SUFFIXES
+    check_effects(request.mode, wanted, fields=fields)
+    drawing = (request.mask, request.keypoints, request.part_labels, request.bbox, request.textures)
+    if not fields and drawing != (None,) * 5:
+        raise InputError(request.figure, "is a finished model, which needs no --mask, --keypoints …", "leave them out")
+    sun = _sun(wanted, request.lonlat, request.time)
+    moving = KINDS[kind_of(request.output)].moving
+    count, rate = _timing(moving, request.frames, request.fps, request.seconds, request.output)
+    look = _picture_request(request, wanted, sun)
+    check_pictures(request.output, request.overwrite, request.size, look.background is None)
+    if request.report is not None:
+        check_text(request.report, request.overwrite)
     if sun is not None and not sun.up:
         log.info("the sun is %.1f° below the horizon: only the sky's light is left", -sun.elevation_deg)
-    request = Request(
-        mode,
-        wanted,
-        size,
-        yaw,
-        pitch,
-        samples,
-        paper,
-        ground,
-        towards_sun(sun, bearing) if sun is not None and sun.up else None,
-        outline_width,
-        _colour("--outline-colour", outline_colour),
-    )
 
     start = time.perf_counter()
+    scene: Scene
     if fields:
-        figure = read_figure(source, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
-        settings = settings_for(
-            quality, parts=parts, textures=textures, contours=contours, device=torch_device(device), seed=seed
-        )
-        if mode == "textured" and settings.textures == "none":
-            raise InputError("--textures", "none, but --mode textured shows them", "use another --mode")
-        scene: Scene = field_scene(figure, settings, request)
+        scene = field_scene(read_figure(**request.reading()), request.settings(), look)
     else:
-        scene = _mesh_scene(source, request)
+        scene = _mesh_scene(request.figure, look)
     ready = time.perf_counter()
     total = _Total()
-    written = write_pictures(output, _turntable(scene, request, count, total), rate, overwrite)
+    written = write_pictures(request.output, _turntable(scene, look, count, total), rate, request.overwrite)
     done = time.perf_counter()
-    if report is not None:
-        facts = _facts(source, output, request, scene, total, sun)
+    if request.report is not None:
+        facts = _facts(request, look, scene, total, sun)
         facts["seconds"] = {"scene": round(ready - start, 3), "pictures": round(done - ready, 3)}
         facts["files"] = [path.name for path in written]
-        write_text(report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
-    log.info("%s", output)
+        write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
+    log.info("%s", request.output)
+
+
+def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun | None) -> Request:
+    """What each picture shows; the yaw is that of the first."""
+    bearing = parse_facing(request.facing)
+    paper = _background(request.background, KINDS[kind_of(request.output)].transparent)
+    samples = request.samples or (1 if request.mode in ("depth", "parts") else 2)
+    if request.size[0] * request.size[1] * samples**2 > MOST_RAYS:
+        found = f"{request.size[0]} {request.size[1]} with {samples} samples a side"
+        raise InputError("--size", found, "give less of either")
+    return Request(
+        request.mode,
+        wanted,
+        request.size,
+        request.yaw,
+        request.pitch,
+        samples,
+        paper,
+        request.ground,
+        towards_sun(sun, bearing) if sun is not None and sun.up else None,
+        request.outline_width,
+        _colour("--outline-colour", request.outline_colour),
+    )
 
 
 def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Iterator[ByteArray]:
@@ -153,19 +126,12 @@ def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Ite
 
 def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldScene:
     """The part fields of a figure and, where the request shows them, its colours; nothing is meshed."""
-    from fig2mesh.convert.pipeline import make_only, steps
-    from fig2mesh.image_frame import image_frame
-    from fig2mesh.parts.pieces import clean
-    from fig2mesh.parts.smooth_union import smooth_union
-
-    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
-    textures = needs(request.mode, request.effects).textures
-    results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-    make_only("textures" if textures else "body", steps(settings, 1.0), results)
-    body = results["body"]
+    goals = (body, parts, textures) if needs(request.mode, request.effects).textures else (body, parts)
+    done = run_stages(figure, settings, goals)
+    fields, sources = done.results[body], done.results[textures] if textures in goals else None
     if "smooth-union" in request.effects:
-        body = smooth_union(body, results["parts"].canvas)
-    return FieldScene(body, results.get("textures"), image_frame(figure))
+        fields = smooth_union(fields, done.results[parts].canvas)
+    return FieldScene(fields, sources, image_frame(done.figure))
 
 
 def _mesh_scene(path: Path, request: Request) -> MeshScene:
@@ -230,11 +196,11 @@ def _colour(option: str, text: str) -> Colour:
     return red, green, blue
 
 
-def _facts(source: Path, output: str, request: Request, scene: Scene, total: _Total, sun: Sun | None) -> dict[str, Any]:
+def _facts(asked: RenderRequest, request: Request, scene: Scene, total: _Total, sun: Sun | None) -> dict[str, Any]:
     view = view_of(scene, request)
     return {
-        "input": source.name,
-        "output": Path(output).name,
+        "input": asked.figure.name,
+        "output": Path(asked.output).name,
         "surface": "fields" if isinstance(scene, FieldScene) else "mesh",
         "mode": request.mode,
         "effects": sorted(request.effects),

@@ -7,7 +7,6 @@ import platform
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.field.body import Body
@@ -83,13 +82,10 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
 
 
 def _body(files: Drawing) -> Body:
-    from fig2mesh.convert.pipeline import make_only, steps
+    from fig2mesh.convert.convert import run_stages
+    from fig2mesh.stages.body import body
 
-    results: dict[str, Any] = {"figure": read_figure(**files.arguments())}
-    make_only("body", steps(PRESETS["standard"], 1.79), results)
-    body = results["body"]
-    assert isinstance(body, Body)
-    return body
+    return run_stages(read_figure(**files.arguments()), PRESETS["standard"], (body,)).results[body]
 
 
 def _machine() -> str:

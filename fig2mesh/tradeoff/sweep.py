@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -84,33 +83,30 @@ def requests(knobs: Sequence[str]) -> Iterator[tuple[str, str, Settings]]:
 def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
     """One run of the pipeline, timed; a fault of the figure is kept, not raised."""
     from fig2mesh.asset_frame import asset_from_figure, on_drawing
-    from fig2mesh.convert.job import peak_mb
-    from fig2mesh.convert.pipeline import steps
+    from fig2mesh.convert.convert import run_stages
+    from fig2mesh.convert.observer import Observer, peak_mb
     from fig2mesh.errors import FigureError
     from fig2mesh.image_frame import image_frame
     from fig2mesh.measure.model import front_similarity, silhouette_iou
-    from fig2mesh.parts.pieces import clean
+    from fig2mesh.stages.lift import lift
+    from fig2mesh.stages.model import model
+    from fig2mesh.stages.simplify import simplify
 
-    seconds: dict[str, float] = {}
+    observer = Observer()
     try:
-        drawn, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
-        results: dict[str, Any] = {"figure": drawn, "pieces": pieces}
-        for step in steps(settings, FIGURE_HEIGHT):
-            start = time.perf_counter()
-            results[step.name] = step.run(*(results[name] for name in step.needs))
-            seconds[step.name] = time.perf_counter() - start
+        done = run_stages(figure, settings, (lift, simplify, model), height_m=FIGURE_HEIGHT, observer=observer)
     except FigureError as error:
-        return Run(knob, value, seconds, peak_mb(), None, failure=str(error))
+        return Run(knob, value, observer.seconds, peak_mb(), None, failure=str(error))
     peak = peak_mb()
-    mesh: TexturedMesh = results["model"][0]
-    transform = asset_from_figure(results["lift"], results["simplify"][0].vertices, FIGURE_HEIGHT)
-    pixel, origin = on_drawing(image_frame(drawn), transform)
+    mesh = done.results[model][0]
+    transform = asset_from_figure(done.results[lift], done.results[simplify][0].vertices, FIGURE_HEIGHT)
+    pixel, origin = on_drawing(image_frame(done.figure), transform)
     ssim = float("nan")
     if mesh.texture is not None:
-        found = front_similarity(mesh, drawn.rgba, drawn.mask, metres_per_pixel=pixel, origin_px=origin)
+        found = front_similarity(mesh, done.figure.rgba, done.figure.mask, metres_per_pixel=pixel, origin_px=origin)
         ssim = found.ssim
-    iou = silhouette_iou(mesh, drawn.mask, metres_per_pixel=pixel, origin_px=origin)
-    return Run(knob, value, seconds, peak, mesh, ssim, iou)
+    iou = silhouette_iou(mesh, done.figure.mask, metres_per_pixel=pixel, origin_px=origin)
+    return Run(knob, value, observer.seconds, peak, mesh, ssim, iou)
 
 
 def sweep(paths: Mapping[str, Path | None], knobs: Sequence[str]) -> Iterator[Run]:

@@ -3,99 +3,76 @@
 from __future__ import annotations
 
 import logging
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
 
-from fig2mesh.convert.asset import torch_device
-from fig2mesh.convert.job import check_text, configure_logging, progress, tell, write_text
-from fig2mesh.convert.place import PlaceRequest, open_map, place
+from fig2mesh.convert.convert import run_stages
+from fig2mesh.convert.observer import Observer
+from fig2mesh.convert.place import log_place, open_map, place
+from fig2mesh.convert.text_file import check_text, write_text
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.image_frame import image_frame
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import Figure
-from fig2mesh.settings import Settings, settings_for
+from fig2mesh.settings import Settings
+from fig2mesh.stages.body import body
+from fig2mesh.stages.lift import lift
+from fig2mesh.stages.textures import textures
+from fig2mesh.terminal import progress
 from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.globe import globe_page
 from fig2mesh.view.page import EFFECTS, view_page
+from fig2mesh.view.request import ViewRequest
 from fig2mesh.view.scene import Scene, make_scene
 from fig2mesh.view.server import page_server, show
 
 log = logging.getLogger("fig2mesh")
 
 
-def run(
-    *,
-    figure: Path,
-    output: Path | None,
-    effects: str | None,
-    cesium: Path | None,
-    mask: Path | None,
-    keypoints: Path | None,
-    part_labels: Path | None,
-    bbox: tuple[int, int, int, int] | None,
-    quality: Any,
-    parts: str,
-    textures: str | None,
-    contours: str,
-    device: str,
-    seed: int,
-    port: int,
-    open_: bool,
-    overwrite: bool,
-    quiet: bool,
-    verbose: int,
-    **where: Any,
-) -> None:
-    """What `fig2mesh view FIGURE …` does; the parameters are the options of the command line.
-
-    where : the fields of `PlaceRequest`
-    """
-    configure_logging(quiet, verbose)
-    request = PlaceRequest(**where)
+def run(request: ViewRequest, quiet: bool = False) -> None:
+    """Do what `fig2mesh view` asks for; quiet : without progress."""
     sheet = open_map(request)
-    wanted = None if effects is None else _effects(effects)
-    if output is not None:
-        if output.suffix.lower() not in (".html", ".htm"):
-            raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
-        check_text(output, overwrite, "-o", "name")
-    if cesium is not None and (not request.somewhere or output is not None):
-        raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
-    folders = {CESIUM: find_cesium(cesium, "--lonlat")} if request.somewhere and output is None else {}
-    drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
-    settings = settings_for(
-        quality, parts=parts, textures=textures, contours=contours, device=torch_device(device), seed=seed
-    )
-    placed = place(request, sheet, drawn, figure)
-    tell(placed)
-    server = page_server("", port) if output is None else None  # a port that is taken is told before the work
-    if server is not None:
-        server.server_close()
+    wanted = None if request.effects is None else _effects(request.effects)
+    _check(request)
+    shown = request.somewhere and request.output is None
+    folders = {CESIUM: find_cesium(request.cesium, "--lonlat")} if shown else {}
+    drawn = read_figure(**request.reading())
+    settings = request.settings()
+    placed = place(request, sheet, drawn, request.figure)
+    log_place(placed)
+    if request.output is None:
+        page_server("", request.port).server_close()  # a port that is taken is reported before the work
     with progress(quiet) as advance:
         scene = scene_of(drawn, settings, placed.height_m, advance)
         advance("page")
         there = placed.placement
         page = view_page(scene, wanted) if there is None else globe_page(scene, there, f"{CESIUM}/", wanted)
-    if output is not None:
-        write_text(output, page, "name")
-        log.info("%s: %.1f MB", output, len(page) / 1e6)
+    if request.output is not None:
+        write_text(request.output, page, "name")
+        log.info("%s: %.1f MB", request.output, len(page) / 1e6)
         return
-    show(page_server(page, port, folders), open_)
+    show(page_server(page, request.port, folders), request.open)
 
 
-def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any = lambda name: None) -> Scene:
-    """The scene of a figure, by those stages of the pipeline that it needs.
-
-    advance : told the name of each stage
-    """
-    from fig2mesh.convert.pipeline import make_only, steps
-    from fig2mesh.image_frame import image_frame
-    from fig2mesh.parts.pieces import clean
-
-    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
-    results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-    make_only("textures", steps(settings, height_m), results, advance)
-    lift, body, sources = results["lift"], results["body"], results["textures"]
+def scene_of(
+    figure: Figure, settings: Settings, height_m: float, advance: Callable[[str], object] = lambda name: None
+) -> Scene:
+    """The scene of a figure, by those stages that it needs; advance : told the name of each."""
+    done = run_stages(figure, settings, (lift, body, textures), height_m=height_m, observer=Observer(advance))
+    fields, sources, pose = done.results[body], done.results[textures], done.results[lift]
     contours = settings.contours == "keep"
-    return make_scene(figure.name, body, sources, image_frame(figure), lift, height_m, contours)
+    return make_scene(done.figure.name, fields, sources, image_frame(done.figure), pose, height_m, contours)
+
+
+def _check(request: ViewRequest) -> None:
+    output = request.output
+    if request.textures == "none":
+        raise InputError("--textures", "none, but the page shows them", "use network or plain")
+    if output is not None:
+        if output.suffix.lower() not in (".html", ".htm"):
+            raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
+        check_text(output, request.overwrite, "-o", "name")
+    if request.cesium is not None and (not request.somewhere or output is not None):
+        raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
 
 
 def _effects(text: str) -> tuple[str, ...]:

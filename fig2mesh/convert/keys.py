@@ -1,12 +1,12 @@
-"""Names of results that say what they were made from: digests of input, settings, code, weights and libraries."""
+"""Keys of results: digests of all that they are made from, which is input, settings, code, weights and libraries."""
 
 from __future__ import annotations
 
 import hashlib
 import importlib.metadata
 import json
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +15,9 @@ import exporters
 import fig2mesh
 import georef
 from fig2mesh.libraries import PACKAGES, version
-from fig2mesh.settings import FIRST_USE, STAGES, Settings
+from fig2mesh.records import Figure
+from fig2mesh.settings import Settings
+from fig2mesh.stages.stage import Stage
 
 NO_RESULTS: Final = ("annotate", "globe", "tradeoff", "training", "view")
 """Folders of code that no figure's files depend on."""
@@ -45,14 +47,22 @@ def key_of(**facts: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def stage_keys(figure: str, settings: Settings, normals: bool) -> dict[str, str]:
-    """The key of each stage's result.
+def stage_keys(stages: Sequence[Stage], settings: Settings, inputs: Mapping[str, str]) -> dict[str, str]:
+    """Key of each stage's result, from the keys of what it needs and the settings that it reads.
 
-    figure : digest of the figure, see `fig2mesh.convert.stage_file.figure_digest`; normals : whether the model has them
+    inputs : key of each input of the pipeline
     """
-    values: dict[str, Any] = {**asdict(settings), "normals": normals}
-    keys = {}
-    for number, stage in enumerate(STAGES):
-        matter = {name: values[name] for name, first in FIRST_USE.items() if STAGES.index(first) <= number}
-        keys[stage] = key_of(stage=stage, figure=figure, device=settings.device, settings=matter)
-    return keys
+    keys = dict(inputs)
+    for stage in stages:
+        read = {name: getattr(settings, name) for name in stage.reads}
+        keys[stage.name] = key_of(stage=stage.name, needs=[keys[name] for name in stage.needs], settings=read)
+    return {stage.name: keys[stage.name] for stage in stages}
+
+
+def figure_digest(figure: Figure) -> str:
+    """Digest of what a figure holds, 64 hexadecimal digits; its name and where it was cut from do not count."""
+    digest = hashlib.sha256()
+    for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
+        digest.update(str(array.shape).encode() + array.tobytes())
+    digest.update(repr(sorted(figure.depth_order.items())).encode())
+    return digest.hexdigest()

@@ -1,0 +1,27 @@
+"""`fig2mesh inspect`: facts about files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+
+from fig2mesh.commands.options import FILE
+
+
+@click.command()
+@click.argument("files", type=FILE, nargs=-1, required=True)
+@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+def inspect(files: tuple[Path, ...], as_json: bool) -> None:
+    """Say what is in a GLB, tileset, USD, PLY or OBJ file."""
+    from exporters.inspect import inspect as facts_of
+
+    facts = {str(path): facts_of(path) for path in files}
+    if as_json:
+        click.echo(json.dumps(next(iter(facts.values())) if len(facts) == 1 else facts, indent=2))
+        return
+    for path, found in facts.items():
+        click.echo(path)
+        for key, value in found.items():
+            click.echo(f"  {key}: {value if not isinstance(value, dict | list) else json.dumps(value)}")

@@ -1,0 +1,47 @@
+"""The main job, `fig2mesh FIGURE …`: one figure from its files to its outputs."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from fig2mesh.commands.options import messages, request_options
+from fig2mesh.convert.request import Request
+from fig2mesh.terminal import configure_logging, log, progress
+
+
+@click.command("make", hidden=True)
+@request_options(Request)
+@messages
+def make(request: Request, quiet: bool, verbose: int) -> None:
+    """Make a 3D model of FIGURE."""
+    configure_logging(quiet, verbose)
+    run(request, quiet)
+
+
+def run(request: Request, quiet: bool = False) -> None:
+    """Convert the figure of a request and write its outputs. Raises InputError."""
+    from fig2mesh.convert.convert import convert
+    from fig2mesh.convert.observer import Observer
+    from fig2mesh.convert.outputs import check_request, write_outputs
+    from fig2mesh.convert.place import clamp_note, log_place
+    from fig2mesh.convert.text_file import write_text
+    from fig2mesh.counters import counting
+
+    # Everything that can be refused is refused before the work begins.
+    check_request(request)
+    with progress(quiet) as advance, counting() as counts:
+        observer = Observer(advance)
+        done = convert(request, observer=observer)
+        log_place(done.placed, clamp_note(request, request.targets))
+        for note in done.notes:
+            log.warning("%s: %s", request.figure, note)
+        written = write_outputs(done.asset, request, observer)
+    if request.report is not None:
+        from fig2mesh.convert.report import make_report
+
+        facts = make_report(done, written, observer, counts)
+        write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
+    for target in request.targets:
+        log.info("%s", target)

@@ -1,0 +1,205 @@
+"""The conversion of one figure: from a request to a placed model. It reads the figure's files and writes none."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exporters.asset import Asset
+from exporters.write import has_levels
+from fig2mesh.convert.asset import asset_of
+from fig2mesh.convert.keys import figure_digest
+from fig2mesh.convert.observer import Observer
+from fig2mesh.convert.place import Placed, open_map, place
+from fig2mesh.convert.plan import Plan, normals_of, plan
+from fig2mesh.convert.request import HEIGHT_M, Request
+from fig2mesh.convert.runner import Inputs, Results, Runner
+from fig2mesh.convert.stores import FolderStore, NoStore, Store
+from fig2mesh.errors import InputError
+from fig2mesh.parse.read import read_figure
+from fig2mesh.parts.pieces import CleanFigure, clean
+from fig2mesh.records import Figure
+from fig2mesh.settings import Settings
+from fig2mesh.stages.lift import lift
+from fig2mesh.stages.model import model
+from fig2mesh.stages.simplify import simplify
+from fig2mesh.stages.solid import solid
+from fig2mesh.stages.table import STAGES
+
+if TYPE_CHECKING:
+    from georef.mapsheet import MapSheet
+
+log = logging.getLogger("fig2mesh")
+
+REQUEST = "request"
+"""Name of the file among the stages' that says what they were made for."""
+
+
+@dataclass(frozen=True)
+class FigureRun:
+    """Stages that were run on a figure.
+
+    figure : without specks, cut down to its silhouette
+    pieces : number of pieces that it is drawn in; specks : number of those that were too small to model
+    """
+
+    figure: Figure
+    pieces: int
+    specks: int
+    results: Results
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """A model, and all that is known of how it came about."""
+
+    request: Request
+    settings: Settings
+    run: FigureRun
+    placed: Placed
+    asset: Asset
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user is to be told of the model, one line each."""
+        notes = []
+        if self.run.specks:
+            notes.append(f"{self.run.specks} specks of the silhouette are too small to model and were left out")
+        found = self.run.results[solid].how
+        if found.components != self.run.pieces:
+            note = f"; {found.note}" if found.note else ""
+            notes.append(f"{found.components} solids for {self.run.pieces} drawn pieces{note}")
+        return tuple(notes)
+
+    @property
+    def plan(self) -> Plan:
+        """Which stages and effects the request needed, and why."""
+        return plan(self.settings, self.request.targets)
+
+    def _repr_png_(self) -> bytes:
+        """The drawing, and the model from the front, the side and behind, as notebooks show it."""
+        from PIL import Image
+
+        from fig2mesh.mesh.preview import views_sheet
+
+        figure = self.run.figure
+        sheet = views_sheet(self.asset.mesh, figure.rgba, mask=figure.mask, yaws=(0, 90, 180), height=360)
+        stream = BytesIO()
+        Image.fromarray(sheet).save(stream, "PNG")
+        return stream.getvalue()
+
+
+def run_stages(
+    figure: Figure,
+    settings: Settings,
+    goals: Sequence[Callable[..., object]],
+    *,
+    height_m: float = HEIGHT_M,
+    store: Store | None = None,
+    observer: Observer | None = None,
+) -> FigureRun:
+    """Run what the stage functions `goals` need on a figure, as it was read; height_m : of the model, metres."""
+    runner = Runner(settings, store=store or NoStore(), observer=observer or Observer())
+    return _run(runner, clean(figure, settings.voxel, settings.picture_px), goals, height_m)
+
+
+def _run(runner: Runner, cleaned: CleanFigure, goals: Sequence[Callable[..., object]], height_m: float) -> FigureRun:
+    results = runner.run(goals, Inputs(cleaned.figure, cleaned.pieces, height_m))
+    return FigureRun(*cleaned, results)
+
+
+def convert(
+    request: Request,
+    figure: Figure | None = None,
+    *,
+    sheet: MapSheet | None = None,
+    store: Store | None = None,
+    observer: Observer | None = None,
+) -> Conversion:
+    """Make the model that a request asks for.
+
+    Parameters
+    ----------
+    figure : what the files of the request hold, where they have been read; default: they are read
+    sheet : the map of the request, where it has been opened; default: it is opened
+    store : where results of stages are looked for, and kept; default: the folder of `request.save_stages`
+    observer : told of each stage
+
+    Raises
+    ------
+    FigureError, InputError : a file or a value cannot be used; see `fig2mesh.parse.read.read_figure` and
+        `fig2mesh.convert.place.open_map`
+    """
+    observer = observer or Observer()
+    check_stages(request)
+    start = time.perf_counter()
+    sheet = sheet or open_map(request)
+    placing_s = time.perf_counter() - start
+    drawn = figure or read_figure(**request.reading(), name=request.name)
+    settings = settings_of(request)
+    if store is None and request.save_stages is not None:
+        store = folder_store(request.save_stages, drawn, settings, request.resume_from)
+    cleaned = clean(drawn, settings.voxel, settings.picture_px)
+    del drawn, figure  # four bytes a pixel of what may be a whole sheet
+    start = time.perf_counter()
+    placed = place(request, sheet, cleaned.figure, request.figure)
+    if request.somewhere:
+        why = "at --map" if request.map is not None else "at --lonlat"
+        observer.note("place", why, placing_s + time.perf_counter() - start)
+    runner = Runner(settings, store=store or NoStore(), observer=observer)
+    run = _run(runner, cleaned, (lift, solid, simplify, model), placed.height_m)
+    asset = asset_of(request, run.figure.name, run.results[model], settings, placed)
+    return Conversion(request, settings, run, placed, asset)
+
+
+def settings_of(request: Request) -> Settings:
+    """Settings of a request, with what its outputs need."""
+    lods = request.lods
+    if lods > 1 and request.resume_from is None and not any(has_levels(target) for target in request.targets):
+        log.info("--lods %d: only 3D Tiles and USD have levels of detail; one is made", lods)
+        lods = 1
+    settings = replace(request.settings(), lods=lods)
+    return replace(settings, normals=normals_of(settings, request.targets).runs)
+
+
+def check_stages(request: Request) -> None:
+    """Refuse a stage to resume from that is not one, or of which nothing can be kept."""
+    names = [stage.name for stage in STAGES]
+    if request.resume_from is not None and request.resume_from not in names:
+        raise InputError("--resume-from", f"{request.resume_from} is no stage", f"choose from {', '.join(names)}")
+    if request.resume_from is not None and request.save_stages is None:
+        raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
+
+
+def folder_store(folder: Path, figure: Figure, settings: Settings, resume_from: str | None) -> FolderStore:
+    """The folder of stages: emptied of other runs, or checked to be of this one where it goes on.
+
+    figure : as it was read; resume_from : name of the first stage that is run again
+    """
+    asked = {"figure": figure_digest(figure), **asdict(settings)}
+    if resume_from is None:
+        for path in folder.glob("*.npz"):
+            if path.stem in (REQUEST, *(stage.name for stage in STAGES)):
+                path.unlink()
+        store = FolderStore(folder)
+        store.write_file(REQUEST, asked)
+        return store
+    first = next(number for number, stage in enumerate(STAGES) if stage.name == resume_from)
+    before = FolderStore(folder).read_file(REQUEST, dict[str, Any])
+    unless = STAGES[first].unless
+    if STAGES[first].left_out(settings) is not None and unless is not None:
+        option = f"--{unless.setting} {unless.value}"
+        raise InputError("--resume-from", f"{resume_from} is not run with {option}", "choose another stage")
+    if before.get("figure") != asked["figure"]:
+        raise InputError("--resume-from", "the stages were made from another figure", "pass that figure, or run anew")
+    for stage in STAGES[:first]:
+        for name in stage.reads:
+            if before.get(name) != asked[name]:
+                found = f"the stages were made with {name} {before.get(name)}, not {asked[name]}"
+                raise InputError("--resume-from", found, f"start at {stage.name} or earlier")
+    return FolderStore(folder, frozenset(stage.name for stage in STAGES[:first]))

@@ -1,0 +1,106 @@
+"""The one runner of stages: it makes what is asked for, with as little work as the store allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar, cast
+
+from fig2mesh.convert.keys import figure_digest, key_of, stage_keys
+from fig2mesh.convert.observer import Observer
+from fig2mesh.convert.stores import NoStore, Store
+from fig2mesh.records import Figure
+from fig2mesh.settings import Settings
+from fig2mesh.stages.stage import Stage
+from fig2mesh.stages.table import STAGES
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the first stages need besides settings.
+
+    figure : without specks, see `fig2mesh.parts.pieces`
+    pieces : number of pieces that the figure is drawn in
+    height_m : of the model, metres
+    """
+
+    figure: Figure
+    pieces: int
+    height_m: float = 1.79
+
+    def values(self) -> dict[str, object]:
+        """By name."""
+        return {"figure": self.figure, "pieces": self.pieces, "height_m": self.height_m}
+
+    def keys(self) -> dict[str, str]:
+        """Key of each."""
+        return {
+            "figure": figure_digest(self.figure),
+            "pieces": key_of(pieces=self.pieces),
+            "height_m": key_of(height_m=self.height_m),
+        }
+
+
+@dataclass(frozen=True)
+class Results:
+    """Results of stages: `results[lift]` is what the stage function `lift` returned, with its type."""
+
+    values: Mapping[str, object]
+
+    def __getitem__(self, stage: Callable[..., T]) -> T:
+        return cast(T, self.values[stage.__name__])
+
+    def __contains__(self, stage: Callable[..., object]) -> bool:
+        return stage.__name__ in self.values
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Runs stages in the order of `stages`.
+
+    settings : each stage gets those that it reads
+    store : where results are looked for, and kept
+    observer : what notes time and memory
+    """
+
+    settings: Settings
+    stages: Sequence[Stage] = STAGES
+    store: Store = field(default_factory=NoStore)
+    observer: Observer = field(default_factory=Observer)
+
+    def keys(self, inputs: Inputs) -> dict[str, str]:
+        """Key of each stage's result."""
+        return stage_keys(self.stages, self.settings, inputs.keys())
+
+    def run(self, goals: Sequence[Callable[..., object]], inputs: Inputs) -> Results:
+        """Results of the stage functions `goals`, and of all that was needed on the way.
+
+        Stages whose results the store holds are not run, nor are those that only they need.
+        """
+        keys = {} if isinstance(self.store, NoStore) else self.keys(inputs)
+        results = inputs.values()
+        wanted = {goal.__name__ for goal in goals}
+        not_run: dict[str, str] = {}
+        # From the goals back to the inputs: what a stage needs is wanted only if the stage is to run.
+        for stage in reversed(self.stages):
+            why = stage.left_out(self.settings)
+            if why is not None:
+                results[stage.name] = None
+                not_run[stage.name] = why
+            elif stage.name not in wanted:
+                not_run[stage.name] = "nothing needs it"
+            elif (found := self.store.load(stage, keys.get(stage.name, ""))) is not None:
+                results[stage.name] = found
+                not_run[stage.name] = "read from the store"
+            else:
+                wanted.update(stage.needs)
+        for stage in self.stages:
+            if stage.name in not_run:
+                self.observer.left_out(stage.name, not_run[stage.name])
+                continue
+            with self.observer.work(stage.name, stage.why(self.settings)):
+                results[stage.name] = stage.run(self.settings, results)
+            self.store.save(stage, keys.get(stage.name, ""), results[stage.name])
+        return Results(results)

@@ -1,0 +1,153 @@
+"""Stores of what stages made: in memory, in the folder of `--save-stages`, or under keys of what it was made from.
+
+A store offers what it holds and keeps what it is given; the runner decides what is needed.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from fig2mesh.convert.record_file import read_record, write_record
+from fig2mesh.errors import FigureError, InputError, OutputError
+from fig2mesh.stages.stage import Kept, Stage
+
+log = logging.getLogger("fig2mesh")
+
+T = TypeVar("T")
+
+
+class Store(Protocol):
+    """Where results of stages are kept."""
+
+    def load(self, stage: Stage, key: str) -> object | None:
+        """The result kept for a stage, or None."""
+
+    def save(self, stage: Stage, key: str, value: object) -> None:
+        """Keep a result, if it is of a kind that this store keeps."""
+
+
+class NoStore:
+    """Keeps nothing."""
+
+    def load(self, stage: Stage, key: str) -> None:
+        return None
+
+    def save(self, stage: Stage, key: str, value: object) -> None:
+        return None
+
+
+@dataclass
+class MemoryStore:
+    """Keeps every result in memory; a change of settings or figure changes the keys of what depends on it."""
+
+    results: dict[str, object] = field(default_factory=dict)
+
+    def load(self, stage: Stage, key: str) -> object | None:
+        return self.results.get(key)
+
+    def save(self, stage: Stage, key: str, value: object) -> None:
+        self.results[key] = value
+
+
+@dataclass(frozen=True)
+class FolderStore:
+    """One file a stage, by its name: `--save-stages DIR`.
+
+    read : names of the stages whose files are to be used; the others are made again, and written
+    """
+
+    folder: Path
+    read: frozenset[str] = frozenset()
+
+    def load(self, stage: Stage, key: str) -> object | None:
+        """Raises FigureError where a file that is to be used is missing or damaged."""
+        if stage.name not in self.read or stage.kept is Kept.NEVER:
+            return None
+        found: object = self.read_file(stage.name, stage.makes)
+        return found
+
+    def save(self, stage: Stage, key: str, value: object) -> None:
+        """Raises OutputError where the disk refuses."""
+        if stage.kept is not Kept.NEVER:
+            self.write_file(stage.name, value)
+
+    def read_file(self, name: str, kind: Any) -> Any:
+        """Contents of `folder/name.npz`; kind : their type. Raises FigureError."""
+        path = self.folder / f"{name}.npz"
+        if not path.exists():
+            raise FigureError(path, "no such file", "run once with --save-stages and without --resume-from")
+        return read_record(path, name, kind)
+
+    def write_file(self, name: str, value: object) -> None:
+        """Write `folder/name.npz`, whole or not at all. Raises OutputError."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_record(self.folder / f"{name}.npz", name, value)
+        except OSError as error:
+            found = f"{self.folder / name}.npz: {error.strerror}"
+            raise OutputError("--save-stages", found, "choose a folder that can be written") from None
+
+
+@dataclass
+class KeyedStore:
+    """Files named by the keys of results, which are therefore never outdated, only unused.
+
+    Any number of processes on any number of machines may share a folder: results of one key are equal, and appear
+    whole or not at all.
+
+    fresh : nothing is read, all is kept; made, reused : names of results that were not there, and that were read
+    """
+
+    folder: Path
+    fresh: bool = False
+    made: list[str] = field(default_factory=list)
+    reused: list[str] = field(default_factory=list)
+
+    def load(self, stage: Stage, key: str) -> object | None:
+        found: object | None = None
+        if stage.kept is Kept.ALWAYS:
+            found = self._load(stage.name, key, stage.makes)
+        return found
+
+    def save(self, stage: Stage, key: str, value: object) -> None:
+        self.made.append(stage.name)
+        if stage.kept is Kept.ALWAYS:
+            self._save(stage.name, key, value)
+
+    def make(self, name: str, key: str, kind: Any, run: Callable[[], T]) -> T:
+        """A result that is not of a stage: read if it is there and sound, else made and kept; kind : its type."""
+        found: T | None = self._load(name, key, kind)
+        if found is None:
+            found = run()
+            self.made.append(name)
+            self._save(name, key, found)
+        return found
+
+    def _path(self, key: str) -> Path:
+        return self.folder / key[:2] / f"{key}.npz"
+
+    def _load(self, name: str, key: str, kind: Any) -> Any:
+        if self.fresh or not self._path(key).is_file():
+            return None
+        try:
+            found = read_record(self._path(key), name, kind)
+        except InputError as error:
+            log.debug("%s; it is made again", error)
+            with suppress(OSError):
+                self._path(key).unlink()
+            return None
+        self.reused.append(name)
+        return found
+
+    def _save(self, name: str, key: str, value: object) -> None:
+        try:
+            self._path(key).parent.mkdir(parents=True, exist_ok=True)
+            write_record(self._path(key), name, value)
+        except OSError as error:
+            # What is not kept is made again; a disk that is full will be reported by the outputs.
+            log.debug("%s: not kept (%s)", self._path(key), error.strerror)

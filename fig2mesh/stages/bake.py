@@ -1,0 +1,33 @@
+"""Stage `bake`: the textures of all levels of detail (paper, appendix C)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fig2mesh.field.body import Body
+from fig2mesh.image_frame import image_frame
+from fig2mesh.mesh.bake import Baked
+from fig2mesh.mesh.bake import bake as bake_mesh
+from fig2mesh.mesh.normals import vertex_normals
+from fig2mesh.records import Figure, UvMesh
+from fig2mesh.stages.unwrap import texels_of_level
+from fig2mesh.texture.sources import Sources
+
+
+def bake(
+    figure: Figure, textures: Sources, body: Body, unwrap: tuple[UvMesh, ...], *, texture_size: int
+) -> tuple[Baked, ...]:
+    """Colour of each texel, and whether the drawing showed it."""
+    frame = image_frame(figure)
+    return tuple(
+        bake_mesh(
+            mesh,
+            vertex_normals(mesh.solid, body),
+            body.nearest_labels(mesh.solid.vertices[mesh.solid.faces].mean(axis=1).astype(np.float32)),
+            textures,
+            frame,
+            texels_of_level(texture_size, level),
+            body,
+        )
+        for level, mesh in enumerate(unwrap)
+    )

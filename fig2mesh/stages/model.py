@@ -1,0 +1,62 @@
+"""Stage `model`: the levels of detail in metres, standing on the ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from exporters.asset import Texture, TexturedMesh
+from fig2mesh.asset_frame import asset_from_figure
+from fig2mesh.mesh.bake import Baked
+from fig2mesh.records import Mesh, Pose3D, Surface, UvMesh
+
+
+def model(
+    lift: Pose3D,
+    surface: tuple[Surface, ...],
+    simplify: tuple[Mesh, ...],
+    unwrap: tuple[UvMesh, ...] | None,
+    bake: tuple[Baked, ...] | None,
+    height_m: float,
+) -> tuple[TexturedMesh, ...]:
+    """Meshes in ASSET, finest first.
+
+    unwrap, bake : None where no texture is asked for
+    height_m : height of the drawn figure, metres
+    """
+    if unwrap is None or bake is None:
+        return _levels(lift, surface, simplify, height_m)
+    bare = _levels(lift, surface, tuple(mesh.solid for mesh in unwrap), height_m)
+    return tuple(
+        replace(
+            level,
+            vertices=level.vertices[mesh.solid_index],
+            faces=mesh.faces,
+            normals=None if level.normals is None else level.normals[mesh.solid_index],
+            solid_index=mesh.solid_index,
+            uv=mesh.uv,
+            texture=Texture(texture.color),
+            observed=Texture(texture.observed[..., None]),
+            parts=None if level.parts is None else level.parts[mesh.solid_index],
+        )
+        for level, mesh, texture in zip(bare, unwrap, bake, strict=True)
+    )
+
+
+def _levels(
+    pose: Pose3D, surfaces: tuple[Surface, ...], meshes: tuple[Mesh, ...], height_m: float
+) -> tuple[TexturedMesh, ...]:
+    asset = asset_from_figure(pose, meshes[0].vertices, height_m)
+    scale = float(asset.matrix[0, 0])
+    return tuple(
+        TexturedMesh(
+            vertices=asset.apply(mesh.vertices).astype(np.float32),
+            faces=mesh.faces,
+            normals=surface.normals,
+            solid_index=np.arange(len(mesh.vertices), dtype=np.int32),
+            parts=surface.parts,
+            deviation_m=(surface.deviation[0] * scale, surface.deviation[1] * scale),
+        )
+        for mesh, surface in zip(meshes, surfaces, strict=True)
+    )

@@ -1,0 +1,34 @@
+"""Stage `textures`: colours for the sides that the drawing does not show (paper §4.3-4.4)."""
+
+from __future__ import annotations
+
+from fig2mesh.field.body import Body
+from fig2mesh.image_frame import image_frame
+from fig2mesh.parts.outline import Outline
+from fig2mesh.records import Figure, FloatArray, Pose3D
+from fig2mesh.settings import Contours, Textures
+from fig2mesh.texture.sources import Sources, make_sources
+from fig2mesh.texture.votes import Unseen
+
+
+def textures(
+    figure: Figure,
+    lift: Pose3D,
+    parts: Outline,
+    body: Body,
+    *,
+    textures: Textures,
+    contours: Contours,
+    texture_size: int,
+    seed: int,
+) -> Sources:
+    """Pictures from which the bake takes the colours of unseen texels."""
+    frame = image_frame(figure)
+
+    def infer(picture: FloatArray) -> Unseen:
+        from fig2mesh.texture.unseen import shipped, unseen_sides
+
+        return unseen_sides(body, lift, picture, frame, shipped())
+
+    inferred = infer if textures == "network" else None
+    return make_sources(figure, frame, parts, texture_size, seed, inferred, contours=contours == "keep")
