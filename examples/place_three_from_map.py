@@ -1,6 +1,6 @@
 """Place the three people of a pictorial map where it shows them, as tall on the globe as they are drawn on the map.
 
-python examples/place_three_from_map.py [OUT]
+python examples/place_three_from_map.py [OUT [QUALITY]]
 
 A collection of three rows: figures.csv says where on the map the feet are, the map's world file where its pixels are on
 the earth. A collection of thousands is converted by the same command. To see the three stand on their map:
@@ -24,7 +24,7 @@ def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("u
     out_dir = Path(out_dir)
     words = [
         "batch", MAP / "figures.csv", "-o", out_dir, "--root", EXAMPLES, "--quality", quality,
-        "--credit", "fig2mesh authors, MIT", "--visible-from", 500_000, "--title", "Around Lake Zürich",
+        "--credit", "fig2mesh authors, MIT", "--title", "Around Lake Zürich",
         *(word for suffix in formats for word in ("--format", suffix)),
     ]  # fmt: skip
     if code := main([str(word) for word in words]):
@@ -34,5 +34,5 @@ def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("u
 
 
 if __name__ == "__main__":
-    for path in run(Path(sys.argv[1] if len(sys.argv) > 1 else "build/map")):
+    for path in run(Path(sys.argv[1] if len(sys.argv) > 1 else "build/map"), *sys.argv[2:3]):
         print(path)

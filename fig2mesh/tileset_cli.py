@@ -16,8 +16,8 @@ TILES_VERSION = click.Choice(["1.0", "1.1"])
 @click.argument("assets", type=FILE, nargs=-1, required=True, metavar="ASSET...")
 @click.option("-o", "--output", type=FILE, required=True, metavar="DIR", help="Folder of the tileset.")
 @click.option(
-    "--visible-from", type=float, default=2000.0, show_default=True, metavar="M",
-    help="Distance from which a figure is drawn, on a screen of 1080 rows.",
+    "--visible-from", type=float, metavar="M",
+    help="Distance from which a figure is drawn, on a screen of 1080 rows; default: about 1,100 times its height.",
 )  # fmt: skip
 @click.option(
     "--tiles-version", type=TILES_VERSION, default="1.1", show_default=True,
@@ -29,7 +29,7 @@ TILES_VERSION = click.Choice(["1.0", "1.1"])
 def tileset(
     assets: tuple[Path, ...],
     output: Path,
-    visible_from: float,
+    visible_from: float | None,
     tiles_version: Any,
     link: bool,
     overwrite: bool,
@@ -41,6 +41,7 @@ def tileset(
     ASSET is a .glb made with --lonlat, the tileset of a figure (with its levels of detail), or a folder of such at any
     depth. Beside the tileset come index.geojson, a map of the figures, and figures.czml, which stands on terrain.
     """
+    from exporters.tiles import too_near_note
     from exporters.tileset_files import write_figures
     from fig2mesh.job import configure_logging, log
 
@@ -48,6 +49,8 @@ def tileset(
     written = write_figures(
         assets, output, visible_from_m=visible_from, version=tiles_version, overwrite=overwrite, link=link
     )
+    if note := too_near_note(visible_from, written.tallest_m):
+        log.warning("%s", note)
     log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))
 
 
