@@ -19,10 +19,12 @@ column_names = st.one_of(
     st.sampled_from(["artist", "Year", "year", "fid", "geom", "name", "NAME", "name_2", "model", "rowid", "title", ""]),
     st.text(max_size=8),
 )
+# fmt: off
 places = st.builds(
     GeoPlacement, longitudes, latitudes, heights, st.sampled_from(["ellipsoid", "egm96"]), headings,
     altitude_mode=st.sampled_from(["absolute", "clamp"]),
-)  # fmt: skip
+)
+# fmt: on
 
 
 @st.composite
@@ -36,9 +38,19 @@ def tables(draw: st.DrawFn) -> list[PlacedFigure]:
 def figure(name: str, place: GeoPlacement, attributes: object = ()) -> PlacedFigure:
     """A figure of one file, `<name>/<name>.glb`."""
     return PlacedFigure(
-        name, place, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (f"{name}/{name}.glb",), (0.0,), "a b.png", "© A & B",
-        ("head", "torso"), (), 0.25, plain_attributes(attributes),  # type: ignore[arg-type]
-    )  # fmt: skip
+        name,
+        place,
+        (0.0, 0.0, 0.0),
+        (1.0, 1.0, 1.0),
+        (f"{name}/{name}.glb",),
+        (0.0,),
+        "a b.png",
+        "© A & B",
+        ("head", "torso"),
+        (),
+        0.25,
+        plain_attributes(attributes),  # type: ignore[arg-type]
+    )
 
 
 def many(count: int) -> Iterator[PlacedFigure]:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from exporters.asset import Asset
-from exporters.part_borders import split_at_parts
+from exporters.gltf.part_borders import split_at_parts
 from exporters.placed_figure import PlacedFigure
-from exporters.tiles import write_tileset
-from exporters.tileset_files import write_figures
-from exporters.tileset_tree import tileset_documents
+from exporters.tiles.gather import write_figures
+from exporters.tiles.tileset import write_tileset
+from exporters.tiles.tree import tileset_documents
 from exporters.write import write
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
@@ -26,7 +26,7 @@ from tests import py3dtiles
 from tests.browser import Look, serving
 from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule
 from tests.exporters.test_clients import HEADINGS, PLACES
-from tests.exporters.test_tileset_tree import crowd, mixed
+from tests.exporters.tiles.test_tree import crowd, mixed
 from tests.node import RunScript
 
 SMALL = (capsule(8, 2),)
@@ -58,10 +58,13 @@ def test_cesium_draws_just_the_figures_within_the_distance(
         (tmp_path / name).write_text(json.dumps(document))
     random = np.random.default_rng(5)
     views = [
-        {"lon_deg": 8.5 + x * visible_from / 111e3, "lat_deg": 47.4 + y * visible_from / 111e3,
-         "height_m": 5000 + z * visible_from}
+        {
+            "lon_deg": 8.5 + x * visible_from / 111e3,
+            "lat_deg": 47.4 + y * visible_from / 111e3,
+            "height_m": 5000 + z * visible_from,
+        }
         for x, y, z in random.uniform([-2, -2, 0], [2, 2, 0.9], (12, 3)).tolist()
-    ]  # fmt: skip
+    ]
     first = figures[0].placement
     views.append({"lon_deg": first.lon_deg, "lat_deg": first.lat_deg, "height_m": first.height_m + visible_from / 2})
     views.append({"lon_deg": -170.0, "lat_deg": -40.0, "height_m": 10.0})
@@ -82,14 +85,20 @@ def test_cesium_draws_figures_of_any_heights_from_as_far_as_their_own(tmp_path: 
     for name, document in tileset_documents(figures):
         (tmp_path / name).write_text(json.dumps(document))
     ranges = {each.contents[0]: 2000 / 1.79 * each.placement.figure_height_m for each in figures}
-    first = {height: next(each for each in figures if each.placement.figure_height_m == height)
-             for height in (1.79, 180.0, 6186.2)}  # fmt: skip
+    first = {
+        height: next(each for each in figures if each.placement.figure_height_m == height)
+        for height in (1.79, 180.0, 6186.2)
+    }
     # Above one figure of each height, within the range of that height and beyond it.
     views = [
-        {"lon_deg": each.placement.lon_deg, "lat_deg": each.placement.lat_deg,
-         "height_m": each.placement.height_m + each.high[2] + share * ranges[each.contents[0]]}
-        for each in first.values() for share in (0.01, 0.5, 0.99, 1.01)
-    ]  # fmt: skip
+        {
+            "lon_deg": each.placement.lon_deg,
+            "lat_deg": each.placement.lat_deg,
+            "height_m": each.placement.height_m + each.high[2] + share * ranges[each.contents[0]],
+        }
+        for each in first.values()
+        for share in (0.01, 0.5, 0.99, 1.01)
+    ]
     found = node("visible.mjs", stdin={"tileset": str(tmp_path / "tileset.json"), "views": views})["views"]
     for view, seen in zip(views, found, strict=True):
         camera = ecef_from_geodetic([[view["lon_deg"], view["lat_deg"], view["height_m"]]])

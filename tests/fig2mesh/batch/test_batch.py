@@ -16,11 +16,11 @@ from typing import Any
 import pystac
 import pytest
 
-from exporters.tiles import VISIBLE_RANGE_PER_ERROR
+from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR
 from exporters.validate import validate
 from fig2mesh.batch.ledger import WORK
 from fig2mesh.batch.row_request import FORMATS
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.benchmarks.batch import convert
 from tests.exporters.walk import contents
 from tests.fig2mesh.batch.small import QUICK, events, manifest, tree, write_csv, write_pictures
@@ -91,14 +91,19 @@ def test_a_rerun_does_no_work(collection: Path, converted: Path, capsys: pytest.
     end = events(capsys.readouterr().out)[-1]
     assert (end["event"], end["stages"], end["counts"]) == ("end", {}, {})
     assert {k: end["progress"][k] for k in ("converted", "unchanged", "failed")} == {
-        "converted": 0, "unchanged": 4, "failed": 5,
-    }  # fmt: skip
+        "converted": 0,
+        "unchanged": 4,
+        "failed": 5,
+    }
     assert (tree(converted), (converted / "manifest.jsonl").read_bytes()) == before
 
 
 def test_what_a_killed_run_had_not_put_in_place_goes(collection: Path, converted: Path) -> None:
-    half = [converted / ".fig2mesh-1-abcd.tmp" / "half.json", converted / WORK / "stages" / "00" / ".ab.partial.npz",
-            converted / WORK / "records" / "00" / ".cd.partial"]  # fmt: skip
+    half = [
+        converted / ".fig2mesh-1-abcd.tmp" / "half.json",
+        converted / WORK / "stages" / "00" / ".ab.partial.npz",
+        converted / WORK / "records" / "00" / ".cd.partial",
+    ]
     for path in half:
         path.parent.mkdir(exist_ok=True)
         path.touch()
@@ -186,10 +191,17 @@ SHIPPED = Path(__file__).resolve().parents[3] / "examples" / "figures" / "farmer
 def shipped(tmp_path: Path) -> Path:
     """A collection of one shipped figure, three times, of the height of a person, a tower, and on a map."""
     rows = [
-        {"figure": SHIPPED / "image.png", "keypoints": SHIPPED / "keypoints.json", "name": name, "height_m": height,
-         "lon": 8.5 + height / 1e5, "lat": 47.4, **QUICK}
+        {
+            "figure": SHIPPED / "image.png",
+            "keypoints": SHIPPED / "keypoints.json",
+            "name": name,
+            "height_m": height,
+            "lon": 8.5 + height / 1e5,
+            "lat": 47.4,
+            **QUICK,
+        }
         for name, height in (("person", 1.79), ("tower", 180.0), ("map", 1800.0))
-    ]  # fmt: skip
+    ]
     return write_csv(tmp_path / "people.csv", rows)
 
 
@@ -237,8 +249,20 @@ def test_figures_of_any_heights_are_drawn_from_as_far_as_their_own(
 
 
 def _command(collection: Path, out: Path) -> list[str]:
-    return [sys.executable, "-m", "fig2mesh", "batch", str(collection), "-o", str(out), "--jobs", "2",
-            "--progress", "json", "-q"]  # fmt: skip
+    return [
+        sys.executable,
+        "-m",
+        "fig2mesh",
+        "batch",
+        str(collection),
+        "-o",
+        str(out),
+        "--jobs",
+        "2",
+        "--progress",
+        "json",
+        "-q",
+    ]
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups")
