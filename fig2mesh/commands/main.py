@@ -102,7 +102,12 @@ def cli() -> None:
 @click.option(
     "--lods", type=click.IntRange(1, 5), default=1, show_default=True, help="Levels of detail (3D Tiles, USD)."
 )
-@click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="3D Tiles only.")
+@click.option(
+    "--visible-from",
+    type=float,
+    metavar="M",
+    help="Distance from which the figure is drawn, 3D Tiles only; default: about 1,100 times its height.",
+)
 @click.option(
     "--tiles-version",
     type=tileset_cli.TILES_VERSION,

@@ -18,10 +18,8 @@ TILES_VERSION = click.Choice(["1.0", "1.1"])
 @click.option(
     "--visible-from",
     type=float,
-    default=2000.0,
-    show_default=True,
     metavar="M",
-    help="Distance from which a figure is drawn, on a screen of 1080 rows.",
+    help="Distance from which a figure is drawn, on a screen of 1080 rows; default: about 1,100 times its height.",
 )
 @click.option(
     "--tiles-version",
@@ -36,7 +34,7 @@ TILES_VERSION = click.Choice(["1.0", "1.1"])
 def tileset(
     assets: tuple[Path, ...],
     output: Path,
-    visible_from: float,
+    visible_from: float | None,
     tiles_version: Any,
     link: bool,
     overwrite: bool,
@@ -49,12 +47,15 @@ def tileset(
     depth. Beside the tileset come index.geojson, a map of the figures, and figures.czml, which stands on terrain.
     """
     from exporters.tiles.gather import write_figures
+    from exporters.tiles.tileset import too_near_note
     from fig2mesh.convert.job import configure_logging, log
 
     configure_logging(quiet, verbose)
     written = write_figures(
         assets, output, visible_from_m=visible_from, version=tiles_version, overwrite=overwrite, link=link
     )
+    if note := too_near_note(visible_from, written.tallest_m):
+        log.warning("%s", note)
     log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))
 
 

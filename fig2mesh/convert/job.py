@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exporters.profiles import Profile, profile_named
+from exporters.tiles.tileset import too_near_note
 from exporters.write import check_outputs, has_levels, in_order, is_tileset, needs_place, write
 from fig2mesh.convert.asset import SETTING_OPTIONS, asset_of, settings_of, torch_device
 from fig2mesh.convert.place import Placed, PlaceRequest, clamp_note, open_map, place
@@ -47,7 +48,7 @@ def run(
     triangles: int | None,
     texture_size: int | None,
     lods: int,
-    visible_from: float,
+    visible_from: float | None,
     tiles_version: Any,
     parts: str,
     textures: str | None,
@@ -86,8 +87,7 @@ def run(
     client = profile_named(profile)
     client.check_tools()
     _check_targets(targets, name or figure.stem, lods, request.somewhere, overwrite, tiles_version, client)
-    if not 0 < visible_from < 1e9:
-        raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
+    check_visible_from(visible_from)
     if report is not None:
         check_text(report, overwrite)
     drawn = read_figure(figure, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox, name=name)
@@ -119,7 +119,8 @@ def run(
     if request.somewhere:
         placing_s += time.perf_counter() - start
         timings.append(Timing("place", placing_s, peak_mb(), "at --map" if sheet is not None else "at --lonlat"))
-    tell(placed, clamp_note(request, targets))
+    near = too_near_note(visible_from, placed.height_m) if any(map(is_tileset, targets)) else None
+    tell(placed, clamp_note(request, targets), near)
     planned = plan(settings, targets)
     stages = None if save_stages is None else _stages(save_stages, whole, settings, planned.normals, resume_from)
     del whole  # four bytes a pixel of what may be a whole sheet
@@ -218,6 +219,12 @@ def _stages(folder: Path, figure: Figure, settings: Settings, normals: bool, res
             found = f"the stages were made with {name} {before.get(name)}, not {request[name]}"
             raise InputError("--resume-from", found, f"start at {stage} or earlier")
     return folder
+
+
+def check_visible_from(visible_from: float | None) -> None:
+    """Refuse a --visible-from that is no distance."""
+    if visible_from is not None and not 0 < visible_from < 1e9:
+        raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
 
 
 def tell(placed: Placed, *more: str | None) -> None:
