@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from fig2mesh.measure import load_textured
-from fig2mesh.preview import LIGHT, views_sheet
+from fig2mesh.measure.model import load_textured
+from fig2mesh.mesh.preview import LIGHT, views_sheet
 
 LONLAT = ("8.5417", "47.3769")
 YAWS, CLAY_YAWS = (0, 35, 90, 180), (35, 90)

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from fig2mesh.mesh.preview import LIGHT
 from fig2mesh.parse.read import read_figure
-from fig2mesh.preview import LIGHT
 from fig2mesh.render.job import field_scene
 from fig2mesh.render.picture import Request, render
 from fig2mesh.render.sun import parse_time, sun_at, towards_sun

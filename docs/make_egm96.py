@@ -47,9 +47,17 @@ def make(gtx: Path, target: Path) -> None:
         (42112, "s", 0, METADATA, True),
     ]
     tifffile.imwrite(
-        target, np.round(heights / STEP_M).astype("<i4"), photometric="minisblack", tile=(256, 256),
-        compression="zlib", predictor=True, compressionargs={"level": 9}, software=None, metadata=None, extratags=tags,
-    )  # fmt: skip
+        target,
+        np.round(heights / STEP_M).astype("<i4"),
+        photometric="minisblack",
+        tile=(256, 256),
+        compression="zlib",
+        predictor=True,
+        compressionargs={"level": 9},
+        software=None,
+        metadata=None,
+        extratags=tags,
+    )
 
 
 if __name__ == "__main__":

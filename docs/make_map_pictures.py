@@ -69,10 +69,17 @@ def map_in_blender(models: list[Path], folder: Path, picture: Path, samples: int
             figures.append({"file": str(model.resolve()), "at_km": at})
     size = [(east - west) * east_km, (north - south) * north_km]
     rendered = folder.resolve() / "blender_map.png"
-    blender(ROOT / "docs" / "blender_map_scene.py", {
-        "map": {"image": str(MAP / "map.jpg"), "size_km": size}, "figures": figures, "picture": str(rendered),
-        "size": SIZE, "samples": samples,
-    }, seconds=3600)  # fmt: skip
+    blender(
+        ROOT / "docs" / "blender_map_scene.py",
+        {
+            "map": {"image": str(MAP / "map.jpg"), "size_km": size},
+            "figures": figures,
+            "picture": str(rendered),
+            "size": SIZE,
+            "samples": samples,
+        },
+        seconds=3600,
+    )
     Image.open(rendered).convert("RGB").save(picture, quality=82, optimize=True)
 
 

@@ -26,6 +26,7 @@ from scipy import ndimage
 
 FIGURES = Path(__file__).resolve().parent / "figures"
 
+# fmt: off
 BONES: tuple[tuple[str, str], ...] = (
     ("eyes", "head"), ("head", "neck"), ("neck", "thorax"), ("thorax", "pelvis"),
     *((f"{side}_{first}", f"{side}_{second}") for side in "lr" for first, second in (
@@ -33,7 +34,8 @@ BONES: tuple[tuple[str, str], ...] = (
         ("hip", "knee"), ("knee", "ankle"), ("ankle", "foot"),
     )),
     *((trunk, f"{side}_{limb}") for side in "lr" for trunk, limb in (("thorax", "shoulder"), ("pelvis", "hip"))),
-)  # fmt: skip
+)
+# fmt: on
 JOINTS = frozenset(joint for bone in BONES for joint in bone)
 COLOURS = {"l": (20, 60, 230), "r": (220, 20, 20), "": (180, 0, 180)}
 GROUND = (232, 236, 226)

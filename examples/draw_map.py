@@ -47,7 +47,7 @@ from examples.map_symbols import (
     shape,
     text,
     tree,
-)  # fmt: skip
+)
 
 HERE = Path(__file__).resolve().parent
 FIGURES, MAPS = HERE / "figures", HERE / "maps"
@@ -204,11 +204,18 @@ def people() -> list[dict[str, str | float]]:
         feet = feet_of(name, top, bottom)
         box = [x + (left - feet) * scale, y - TALL, x + (right - feet) * scale, y]
         metres = TALL * METRES_PER_DEGREE[1] * (NORTH - SOUTH) / HEIGHT
-        rows.append({
-            "name": name.replace("_", " "), "figure": f"../../figures/{name}/image.png",
-            "keypoints": f"../../figures/{name}/keypoints.json", "map": "map.jpg", "x": x, "y": y,
-            "height-m": round(metres, 1), "box_on_map": " ".join(str(round(v)) for v in box),
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": name.replace("_", " "),
+                "figure": f"../../figures/{name}/image.png",
+                "keypoints": f"../../figures/{name}/keypoints.json",
+                "map": "map.jpg",
+                "x": x,
+                "y": y,
+                "height-m": round(metres, 1),
+                "box_on_map": " ".join(str(round(v)) for v in box),
+            }
+        )
     return rows
 
 

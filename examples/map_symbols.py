@@ -75,7 +75,7 @@ def church(x: float, y: float, size: float) -> str:
 
 def text(
     x: float, y: float, words: str, size: float, style: str = "", anchor: str = "middle", halo: bool = True
-) -> str:  # fmt: skip
+) -> str:
     """Lettering; halo: the land's colour round it, so that it can be read over lines."""
     at = f'x="{x:.1f}" y="{y:.1f}" font-family="STIXGeneral" font-size="{size}" text-anchor="{anchor}" {style}'
     ground = f'stroke="{LAND}" stroke-width="6" stroke-linejoin="round" fill="{LAND}" opacity="0.85"'

@@ -8,9 +8,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from fig2mesh.cli import main
-from fig2mesh.measure import load_textured
-from fig2mesh.preview import write_preview
+from fig2mesh.commands.main import main
+from fig2mesh.measure.model import load_textured
+from fig2mesh.mesh.preview import write_preview
 
 FIGURES = Path(__file__).parent / "figures"
 

@@ -13,7 +13,7 @@ import json
 import sys
 from pathlib import Path
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 
 EXAMPLES = Path(__file__).resolve().parent
 MAP = EXAMPLES / "maps" / "lake_zurich"
@@ -23,10 +23,22 @@ def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("u
     """Convert the figures on the map; return the files made, one a figure and format, and the tileset of all."""
     out_dir = Path(out_dir)
     words = [
-        "batch", MAP / "figures.csv", "-o", out_dir, "--root", EXAMPLES, "--quality", quality,
-        "--credit", "fig2mesh authors, MIT", "--visible-from", 500_000, "--title", "Around Lake Zürich",
+        "batch",
+        MAP / "figures.csv",
+        "-o",
+        out_dir,
+        "--root",
+        EXAMPLES,
+        "--quality",
+        quality,
+        "--credit",
+        "fig2mesh authors, MIT",
+        "--visible-from",
+        500_000,
+        "--title",
+        "Around Lake Zürich",
         *(word for suffix in formats for word in ("--format", suffix)),
-    ]  # fmt: skip
+    ]
     if code := main([str(word) for word in words]):
         raise SystemExit(code)
     rows = map(json.loads, (out_dir / "manifest.jsonl").read_text(encoding="utf-8").splitlines())

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from exporters.solid import measure_topology
-from georef.json_file import is_there
+from georef.untrusted.json_file import is_there
 
 
 def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:

@@ -13,12 +13,12 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.b3dm import part_table
 from exporters.errors import DAMAGE, ExportError
 from exporters.georeference import placement_of_record
-from exporters.glb_container import open_glb
-from exporters.gltf_reader import Gltf
+from exporters.gltf.container import open_glb
+from exporters.gltf.reader import Gltf
 from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
+from exporters.tiles.b3dm import part_table
 from georef.errors import InputError
 from georef.geodesy import tile_from_asset
 
@@ -130,7 +130,7 @@ def _observed(gltf: Gltf, shares: NDArray[np.float64]) -> float | None:
 
 def _tileset(path: Path, chain: frozenset[Path], read: set[Path]) -> Iterator[PlacedFigure]:
     """The figures of a tileset; chain : files it is reached by; read : files whose figures are known, it is added."""
-    from exporters.check_tiles import read_tileset
+    from exporters.tiles.check import read_tileset
 
     document = read_tileset(path)
     if path.resolve() in chain:

@@ -58,9 +58,7 @@ def check_solid(vertices: NDArray[Any], faces: NDArray[Any], where: str) -> list
         "NONMANIFOLD_VERTEX": (found.nonmanifold_vertices, "surfaces that touch in one vertex only"),
         "DEGENERATE_TRIANGLE": (found.degenerate_faces, "triangles that name a vertex twice"),
     }
-    findings = [
-        Finding("error", code, f"{count} {what}", where) for code, (count, what) in counts.items() if count
-    ]  # fmt: skip
+    findings = [Finding("error", code, f"{count} {what}", where) for code, (count, what) in counts.items() if count]
     if found.solid and found.volume <= 0:
         findings.append(Finding("error", "INSIDE_OUT", f"encloses {found.volume:.3g} cubic metres", where))
     return findings

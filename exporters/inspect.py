@@ -11,15 +11,15 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from exporters.check_tiles import read_tileset
 from exporters.errors import DAMAGE, ExportError
 from exporters.facts import file_sizes, solid_facts
 from exporters.georeference import placement_of_tile
-from exporters.gltf_reader import Gltf, read_gltf
-from exporters.inspect_places import collection_facts, places_facts
+from exporters.gis.inspect import collection_facts, places_facts
+from exporters.gltf.reader import Gltf, read_gltf
 from exporters.solid import merged_by_position
 from exporters.texture_files import texture_size
-from exporters.usd_process import usd_facts_apart
+from exporters.tiles.check import read_tileset
+from exporters.usd.process import usd_facts_apart
 from exporters.validate import read_triangles
 
 

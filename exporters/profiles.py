@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Literal
 
 from exporters.errors import ExportError
-from exporters.ktx2 import encoder
-from exporters.meshopt import codec
+from exporters.gltf.ktx2 import encoder
+from exporters.gltf.meshopt import codec
 
 TILES = "3D Tiles"
 """Stands for tilesets among the suffixes that a client reads."""

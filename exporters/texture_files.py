@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from exporters.ktx2 import IDENTIFIER, size_of
+from exporters.gltf.ktx2 import IDENTIFIER, size_of
 
 if TYPE_CHECKING:
     from PIL import Image

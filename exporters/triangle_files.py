@@ -11,7 +11,7 @@ from pathlib import Path
 
 from exporters.errors import ExportError
 from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
-from georef.json_file import is_there, read_bytes
+from georef.untrusted.json_file import is_there, read_bytes
 
 MAX_TRIANGLE_BYTES = 256 << 20
 """Largest PLY or OBJ that is read: some 10 million triangles; trimesh needs about ten times as much memory."""

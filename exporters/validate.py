@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from exporters.check_gltf import check_gltf
-from exporters.check_places import check_czml, check_geojson
-from exporters.check_tiles import check_tileset
 from exporters.errors import DAMAGE, ExportError
 from exporters.findings import Finding, check_solid
+from exporters.gis.check import check_czml, check_geojson
+from exporters.gltf.check import check_gltf
 from exporters.solid import merged_by_position
+from exporters.tiles.check import check_tileset
 from exporters.triangle_files import check_triangle_file, references_of
-from exporters.usd_process import check_usd_apart
-from georef.json_file import is_there
+from exporters.usd.process import check_usd_apart
+from georef.untrusted.json_file import is_there
 
 __all__ = ["Finding", "read_triangles", "validate"]
 

@@ -15,15 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from exporters.asset import Asset
-from exporters.czml import write_czml
 from exporters.errors import ExportError
-from exporters.geojson import write_geojson
-from exporters.glb import write_glb, write_gltf
+from exporters.gis.czml import write_czml
+from exporters.gis.geojson import write_geojson
+from exporters.gltf.glb import write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
 from exporters.profiles import GENERAL, Profile, suffix_of
-from exporters.tiles import DEFAULT_VISIBLE_FROM_M, TilesVersion, content_name, write_tileset
-from exporters.usd import texture_name, write_usd
+from exporters.tiles.tileset import DEFAULT_VISIBLE_FROM_M, TilesVersion, content_name, write_tileset
+from exporters.usd.stage import texture_name, write_usd
 
 OutputPath = str | os.PathLike[str]
 
@@ -141,7 +141,7 @@ def write(
     asset : not changed
     path : a file with a suffix of `FORMATS`; a folder or its tileset.json for 3D Tiles. Missing folders are made
     overwrite : replace what is there; in the folder of a tileset only files of the names we write
-    visible_from_m, tiles_version : for 3D Tiles, see `exporters.tiles.write_tileset`
+    visible_from_m, tiles_version : for 3D Tiles, see `exporters.tiles.tileset.write_tileset`
     profile : what the client of the file takes
     returns : the files written, the one that names the others last
 

@@ -1,6 +1,6 @@
 """`python -m fig2mesh`."""
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 
 if __name__ == "__main__":
     raise SystemExit(main())

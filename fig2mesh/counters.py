@@ -8,15 +8,23 @@ from contextvars import ContextVar
 from typing import Final, Literal
 
 Work = Literal[
-    "pose network", "part networks", "texture coordinate network", "texture completion network",
-    "field values", "rays", "shading normals", "texels",
-]  # fmt: skip
+    "pose network",
+    "part networks",
+    "texture coordinate network",
+    "texture completion network",
+    "field values",
+    "rays",
+    "shading normals",
+    "texels",
+]
 """calls of a network with one figure or part; points; rays; vertices; texels that were coloured"""
 
+# fmt: off
 WORK: Final[tuple[Work, ...]] = (
     "pose network", "part networks", "texture coordinate network", "texture completion network",
     "field values", "rays", "shading normals", "texels",
-)  # fmt: skip
+)
+# fmt: on
 
 _counts: ContextVar[dict[Work, int] | None] = ContextVar("counts", default=None)
 

@@ -65,12 +65,14 @@ EFFECTS = ("light", "none")
 STAGES = ("lift", "parts", "body", "cloud", "solid", "simplify", "surface", "unwrap", "textures", "bake", "model")
 """Names of the pipeline's stages, in order; the isosurface needs no "cloud"."""
 
+# fmt: off
 FIRST_USE = {
     "parts": "lift", "part_nodes": "parts", "precision": "parts",
     "canvas_px": "parts", "voxel": "parts", "spacing": "cloud", "seed": "cloud",
     "mesher": "solid", "closing": "solid", "triangles": "simplify", "lods": "simplify", "texture_size": "unwrap",
     "normals": "surface", "textures": "unwrap", "contours": "textures", "light": "model",
-}  # fmt: skip
+}
+# fmt: on
 """Setting → the first stage that it changes; "normals": whether outputs or effects need them."""
 
 PRESETS: dict[Quality, Settings] = {

@@ -130,9 +130,17 @@ class MapSheet:
             notes.append(f"{self.crs}: known to {accuracy:g} m against WGS 84 without grids that are not at hand")
         up = _bearing(-down)
         return SheetPlace(
-            lon, lat, up, normalized_bearing(up + 180.0), float(np.linalg.norm(down)), float(np.linalg.norm(right)),
-            float(scales[0] / scales[1]), mirrored, outside, tuple(notes),
-        )  # fmt: skip
+            lon,
+            lat,
+            up,
+            normalized_bearing(up + 180.0),
+            float(np.linalg.norm(down)),
+            float(np.linalg.norm(right)),
+            float(scales[0] / scales[1]),
+            mirrored,
+            outside,
+            tuple(notes),
+        )
 
     def _outside(self, pixel: FloatArray, lonlat: FloatArray) -> float | None:
         if not len(self.pixels):
@@ -196,10 +204,17 @@ def _given(
     crs = _chosen(named, map_crs, file, notes)
     matrix = affine.matrix
     return MapSheet(
-        file, picture, size, "given", crs.name, plane_of(crs, file),
+        file,
+        picture,
+        size,
+        "given",
+        crs.name,
+        plane_of(crs, file),
         lambda points: np.asarray(points @ matrix[:, :2].T + matrix[:, 2]),
-        np.empty((0, 2)), None, tuple(notes),
-    )  # fmt: skip
+        np.empty((0, 2)),
+        None,
+        tuple(notes),
+    )
 
 
 def _chosen(named: str | None, map_crs: str | None, file: Path, notes: list[str]) -> CRS:

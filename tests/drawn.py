@@ -14,21 +14,23 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fig2mesh.field.body import Body
-from fig2mesh.measure_front import thickness_at
+from fig2mesh.image_frame import ImageFrame, image_frame
+from fig2mesh.measure.front import thickness_at
 from fig2mesh.mesh.isosurface import isosurface
-from fig2mesh.parse.frame import ImageFrame, image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import JOINT, JOINT_NAMES, Figure, Mesh, Pose3D
 
+# fmt: off
 JOINTS = {
     "head": (100, 40), "eyes": (100, 36), "neck": (100, 68), "thorax": (100, 90), "pelvis": (100, 160),
     "l_shoulder": (122, 82), "r_shoulder": (78, 82), "l_elbow": (150, 112), "r_elbow": (50, 112),
     "l_wrist": (172, 142), "r_wrist": (28, 142), "l_hand": (178, 150), "r_hand": (22, 150),
     "l_hip": (113, 165), "r_hip": (87, 165), "l_knee": (122, 220), "r_knee": (78, 220),
     "l_ankle": (126, 272), "r_ankle": (74, 272), "l_foot": (134, 282), "r_foot": (66, 282),
-}  # fmt: skip
+}
+# fmt: on
 """IMAGE pixels on a picture of 200 x 300; a figure seen from the front, arms and legs apart."""
 
 SIZE = (200, 300)

@@ -50,9 +50,13 @@ def runner(modules: Path) -> RunScript:
     def run(script: str, *arguments: str | Path, stdin: Any = None) -> Any:
         done = subprocess.run(
             ["node", str(CLIENTS / script), *map(str, arguments)],
-            input=json.dumps(stdin), capture_output=True, text=True, check=True, timeout=300,
+            input=json.dumps(stdin),
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=300,
             env=os.environ | {"NODE_PATH": str(modules)},
-        )  # fmt: skip
+        )
         return json.loads(done.stdout)
 
     return run

@@ -30,8 +30,12 @@ def read(script: str, tileset: Path) -> Any:
             if problem := install(sys.executable, *target, f"py3dtiles=={VERSION}"):
                 pytest.skip(f"py3dtiles cannot be installed: {problem}")
     done = subprocess.run(
-        [sys.executable, str(CLIENTS / script), str(tileset)], capture_output=True, text=True, check=False,
-        timeout=120, env=os.environ | {"PYTHONPATH": str(FOLDER)},
-    )  # fmt: skip
+        [sys.executable, str(CLIENTS / script), str(tileset)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        env=os.environ | {"PYTHONPATH": str(FOLDER)},
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

@@ -63,7 +63,7 @@ def test_imports_go_one_way(package):
 @pytest.mark.parametrize(
     "source",
     [
-        "import exporters.glb",
+        "import exporters.gltf.glb",
         "from fig2mesh import records",
         "def f():\n    import torch.nn as nn",
         "import importlib\nimportlib.import_module('trimesh')",

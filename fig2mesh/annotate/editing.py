@@ -24,11 +24,13 @@ INSIDE = 128
 MOST_PIXELS = 40_000_000
 """Browsers do not draw on larger canvases."""
 
+# fmt: off
 STANDING = {
     "head": (0.0, 0.07), "eyes": (0.0, 0.065), "neck": (0.0, 0.15), "thorax": (0.0, 0.21), "pelvis": (0.0, 0.5),
     "shoulder": (0.11, 0.19), "elbow": (0.16, 0.34), "wrist": (0.18, 0.48), "hand": (0.185, 0.52),
     "hip": (0.06, 0.52), "knee": (0.065, 0.73), "ankle": (0.07, 0.95), "foot": (0.085, 0.985),
-}  # fmt: skip
+}
+# fmt: on
 """A standing person seen from the front: (right as seen of the middle for its left side, down), in heights."""
 
 
@@ -100,11 +102,16 @@ def packed(subject: Subject, annotation: Annotation) -> bytes:
     height, width = annotation.mask.shape
     rows = zip(JOINT_NAMES, annotation.joints_px.astype(float).tolist(), annotation.visible.tolist(), strict=True)
     head = {
-        "name": subject.name, "width": width, "height": height,
+        "name": subject.name,
+        "width": width,
+        "height": height,
         "joints": {name: [*point, int(seen)] for name, point, seen in rows},
         "depth_order": dict(annotation.depth_order),
-        "parts": PART_NAMES, "colours": COLOURS, "bones": SKELETON, "limbs": LIMBS,
-    }  # fmt: skip
+        "parts": PART_NAMES,
+        "colours": COLOURS,
+        "bones": SKELETON,
+        "limbs": LIMBS,
+    }
     pixels = np.where(annotation.mask, annotation.part_labels | INSIDE, 0).astype(np.uint8)
     text = json.dumps(head).encode()
     return struct.pack("<I", len(text)) + text + pixels.tobytes()

@@ -10,8 +10,8 @@ from typing import Any
 
 from fig2mesh.annotate.editing import Subject, begin
 from fig2mesh.annotate.server import annotation_server
+from fig2mesh.convert.job import configure_logging
 from fig2mesh.errors import FigureError, OutputError
-from fig2mesh.job import configure_logging
 from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, on_whole_picture, write_annotation
 from fig2mesh.settings import settings_for
 from fig2mesh.view.job import scene_of

@@ -98,11 +98,17 @@ class DaskEngine:
                     f"worker {worker}", f"cannot run fig2mesh ({reason})", "install the same version there"
                 )
             if facts.code != fingerprint():
-                raise InputError(f"worker {worker}", "has another version of fig2mesh or of a library",
-                                 "install the same versions there")  # fmt: skip
+                raise InputError(
+                    f"worker {worker}",
+                    "has another version of fig2mesh or of a library",
+                    "install the same versions there",
+                )
             if not facts.sees:
-                raise InputError(f"worker {worker}", f"does not see {self._batch.folder}",
-                                 "give -o DIR on a disk that all machines share, under the same path")  # fmt: skip
+                raise InputError(
+                    f"worker {worker}",
+                    f"does not see {self._batch.folder}",
+                    "give -o DIR on a disk that all machines share, under the same path",
+                )
         self._threads: int = sum(facts.threads for facts in found.values())
 
     @property
@@ -143,8 +149,11 @@ class DaskEngine:
                 yield outcome
         except (OSError, TimeoutError) as error:
             reason = " ".join(str(error).split())[:120] or type(error).__name__
-            raise InputError(f"--address {self._address}", f"the scheduler is lost ({reason})",
-                             "start it and its workers, and run the same command again") from None  # fmt: skip
+            raise InputError(
+                f"--address {self._address}",
+                f"the scheduler is lost ({reason})",
+                "start it and its workers, and run the same command again",
+            ) from None
         finally:
             with suppress(Exception):
                 self._client.unsubscribe_topic(TOPIC)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from fig2mesh.batch.collection import read_rows
+from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.engine import Engine, Stage
 from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.local_engine import LocalEngine
@@ -58,7 +58,7 @@ def run(
 
     Returns the exit code: 0 all rows are done, 2 some are not because of their input, 1 because of us.
     """
-    from fig2mesh.job import configure_logging
+    from fig2mesh.convert.job import configure_logging
 
     configure_logging(quiet, verbose)
     if engine == "dask" and address is None:
@@ -140,8 +140,9 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
     if not (folder / WORK).is_dir() and not overwrite:
         for name in TAKEN:
             if (folder / name).exists():
-                raise OutputError(folder / name, "exists, and is not of an earlier batch",
-                                  "pass --overwrite or another -o DIR")  # fmt: skip
+                raise OutputError(
+                    folder / name, "exists, and is not of an earlier batch", "pass --overwrite or another -o DIR"
+                )
     try:
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
@@ -184,8 +185,13 @@ def _keep_failure(folder: Path, outcome: Outcome) -> None:
 def _tell(folder: Path, tally: Tally, summary: Summary) -> None:
     log.info(
         "%s: %d figures: %d converted, %d unchanged, %d failed; %d on the globe",
-        folder, tally.total, tally.converted, tally.unchanged, tally.failed, summary.figures,
-    )  # fmt: skip
+        folder,
+        tally.total,
+        tally.converted,
+        tally.unchanged,
+        tally.failed,
+        summary.figures,
+    )
     if summary.unplaced:
         log.info("%d figures have no place and are not in the tileset", summary.unplaced)
     if summary.left:

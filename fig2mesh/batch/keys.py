@@ -14,7 +14,7 @@ from typing import Any, Final
 import exporters
 import fig2mesh
 import georef
-from fig2mesh.doctor import PACKAGES, version
+from fig2mesh.libraries import PACKAGES, version
 from fig2mesh.settings import FIRST_USE, STAGES, Settings
 
 NO_RESULTS: Final = ("annotate", "globe", "tradeoff", "training", "view")
@@ -48,7 +48,7 @@ def key_of(**facts: Any) -> str:
 def stage_keys(figure: str, settings: Settings, normals: bool) -> dict[str, str]:
     """The key of each stage's result.
 
-    figure : digest of the figure, see `fig2mesh.stages.figure_digest`; normals : whether the model has them
+    figure : digest of the figure, see `fig2mesh.convert.stage_file.figure_digest`; normals : whether the model has them
     """
     values: dict[str, Any] = {**asdict(settings), "normals": normals}
     keys = {}

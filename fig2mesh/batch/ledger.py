@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from georef.json_file import parse_json
+from georef.untrusted.json_file import parse_json
 
 WORK: Final = ".fig2mesh"
 """Folder, in that of the outputs, of everything that reruns go on from."""

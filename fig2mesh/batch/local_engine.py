@@ -17,8 +17,10 @@ from fig2mesh.batch.engine import Stage, lost
 from fig2mesh.batch.row_job import check_row, convert_row
 from fig2mesh.batch.task import Batch, Outcome, Task
 
+# fmt: off
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
-                  "VIPS_CONCURRENCY")  # fmt: skip
+                  "VIPS_CONCURRENCY")
+# fmt: on
 
 TRIES: Final = 2
 """A row whose worker died is tried again; if that one dies too, the row is at fault, or the machine too small."""

@@ -91,10 +91,14 @@ class Tally:
         """For events."""
         left = self.left_s
         return {
-            "total": self.total, "ended": self.ended, "converted": self.converted, "unchanged": self.unchanged,
-            "failed": self.failed, "rows_per_minute": round(self.per_minute, 2),
+            "total": self.total,
+            "ended": self.ended,
+            "converted": self.converted,
+            "unchanged": self.unchanged,
+            "failed": self.failed,
+            "rows_per_minute": round(self.per_minute, 2),
             "seconds_left": None if left is None else round(left, 1),
-        }  # fmt: skip
+        }
 
 
 class Events:
@@ -116,10 +120,17 @@ class Events:
     def row(self, outcome: Outcome, tally: Tally) -> None:
         """A row has ended."""
         self.say(
-            "row", row=outcome.number, name=outcome.name, status=outcome.status, error=outcome.error,
-            unchanged=outcome.unchanged, seconds=outcome.seconds, ran=list(outcome.ran), reused=list(outcome.reused),
+            "row",
+            row=outcome.number,
+            name=outcome.name,
+            status=outcome.status,
+            error=outcome.error,
+            unchanged=outcome.unchanged,
+            seconds=outcome.seconds,
+            ran=list(outcome.ran),
+            reused=list(outcome.reused),
             progress=tally.as_dict(),
-        )  # fmt: skip
+        )
 
 
 class Lines:
@@ -210,9 +221,12 @@ def _bar(tally: Tally, workers: Workers | None) -> Iterator[Watcher]:
     from rich.text import Text
 
     progress = Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
         TimeElapsedColumn(),
-    )  # fmt: skip
+    )
     task = progress.add_task("figures", total=tally.total, rate="")
 
     def shown() -> Any:

@@ -12,10 +12,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
 from fig2mesh.batch.row_files import digest_of
 from fig2mesh.batch.row_request import RowRequest
-from fig2mesh.batch.rows import Value
 from fig2mesh.batch.stage_cache import StageCache
 from fig2mesh.batch.task import Batch, Outcome, Task
 from fig2mesh.errors import FigureError, InputError, OutputError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from exporters.asset import Asset
     from exporters.placed_figure import Attributes
     from exporters.profiles import Profile
-    from fig2mesh.place import Placed
+    from fig2mesh.convert.place import Placed
 
 UNKNOWN_DATE = "0001/9999"
 """A catalogue must have a date; when a file was changed says nothing of the drawing, and is lost by copying."""
@@ -141,15 +141,15 @@ def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], adva
     from exporters.placed_figure import figure_of
     from fig2mesh.batch.keys import key_of, stage_keys
     from fig2mesh.batch.stage_cache import MEASURES, READ
-    from fig2mesh.convert import asset_of, settings_of, torch_device
+    from fig2mesh.convert.asset import asset_of, settings_of, torch_device
+    from fig2mesh.convert.pipeline import steps
+    from fig2mesh.convert.place import place
+    from fig2mesh.convert.plan import plan
+    from fig2mesh.convert.report import model_measures
+    from fig2mesh.convert.stage_file import figure_digest
     from fig2mesh.counters import counting
     from fig2mesh.parse.read import read_figure
     from fig2mesh.parts.pieces import clean
-    from fig2mesh.pipeline import steps
-    from fig2mesh.place import place
-    from fig2mesh.plan import plan
-    from fig2mesh.report import model_measures
-    from fig2mesh.stages import figure_digest
 
     profile = request.profile()
     settings = settings_of(device=torch_device(request.values["device"]), **request.settings())
@@ -160,9 +160,7 @@ def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], adva
         files = {name: (path.name, digest_of(path)) for name in own if (path := request.values[name]) is not None}
         key = key_of(stage=READ, files=files, bbox=request.values["bbox"])
         drawn = cache.make(READ, key, lambda: read_figure(**request.files(), name=READ))
-        figure, pieces, specks = clean(
-            replace(drawn, name=request.task.title), settings.voxel, settings.picture_px
-        )  # fmt: skip
+        figure, pieces, specks = clean(replace(drawn, name=request.task.title), settings.voxel, settings.picture_px)
         placed = place(request.place, sheet, figure, request.values["figure"])
         normals = plan(settings, request.targets).normals
         road = steps(settings, placed.height_m, normals=normals)
@@ -170,9 +168,15 @@ def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], adva
         keys = stage_keys(figure_digest(figure), settings, normals)
         cache.make_only(("model", "simplify"), road, results, keys, advance)
         asset = asset_of(
-            request.task.title, results["model"], settings, placed, source=request.values["figure"].name,
-            quality=request.values["quality"], credit=request.values["credit"], evidence=request.values["evidence"],
-        )  # fmt: skip
+            request.task.title,
+            results["model"],
+            settings,
+            placed,
+            source=request.values["figure"].name,
+            quality=request.values["quality"],
+            credit=request.values["credit"],
+            evidence=request.values["evidence"],
+        )
         advance("write")
         outputs = _write(request, asset, profile, before)
         shape = key_of(
@@ -209,7 +213,7 @@ def _notes(request: RowRequest, placed: Placed, specks: int, measures: dict[str,
 
 def _levels(request: RowRequest, asset: Asset) -> list[str]:
     """Files of the levels of detail, finest first."""
-    from exporters.tiles import content_name
+    from exporters.tiles.tileset import content_name
 
     return [content_name(request.task.name, level) for level in range(len(asset.lods))]
 

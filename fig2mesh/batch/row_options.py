@@ -14,11 +14,13 @@ from typing import Any
 
 import click
 
-from fig2mesh.batch.rows import Value
+from fig2mesh.batch.collections.rows import Value
 from fig2mesh.errors import InputError
 
+# fmt: off
 OURS = ("output", "overwrite", "save-stages", "resume-from", "report", "quiet", "verbose", "tiles-version",
-        "visible-from")  # fmt: skip
+        "visible-from")
+# fmt: on
 """Options of the main job that no row has: the batch chooses where things go and what is said."""
 
 PAIRS = {"lonlat": ("lon", "lat"), "at": ("x", "y")}
@@ -50,7 +52,7 @@ class RowOptions:
 
 @cache
 def _command() -> click.Command:
-    from fig2mesh.cli import make
+    from fig2mesh.commands.main import make
 
     return make
 

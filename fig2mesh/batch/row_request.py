@@ -15,7 +15,7 @@ from fig2mesh.errors import InputError
 
 if TYPE_CHECKING:
     from exporters.profiles import Profile
-    from fig2mesh.place import PlaceRequest
+    from fig2mesh.convert.place import PlaceRequest
     from georef.mapsheet import MapSheet
 
 FORMATS = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
@@ -32,7 +32,7 @@ class RowRequest:
     """
 
     def __init__(self, batch: Batch, task: Task) -> None:
-        from exporters.time_span import time_span
+        from exporters.gis.time_span import time_span
         from fig2mesh.batch.keys import key_of
 
         if task.problem is not None:
@@ -55,19 +55,23 @@ class RowRequest:
         files = input_files(self.values)
         self.inputs: dict[str, str] = {
             self._seen(file): digest_of(file) for name in sorted(files) for file in files[name]
-        }  # fmt: skip
+        }
         texts = {name: self._seen(v) if isinstance(v, Path) else str(v) for name, v in self.values.items()}
         self.key = key_of(
-            options=texts, formats=self.options.formats, date=self.options.date, inputs=self.inputs,
-            attributes=self.options.attributes, title=task.title,
-        )  # fmt: skip
+            options=texts,
+            formats=self.options.formats,
+            date=self.options.date,
+            inputs=self.inputs,
+            attributes=self.options.attributes,
+            title=task.title,
+        )
 
     def _seen(self, file: Path) -> str:
         real, root = Path(os.path.realpath(file)), self.batch.roots.root
         return (real.relative_to(root) if real.is_relative_to(root) else real).as_posix()
 
     def _place(self) -> PlaceRequest:
-        from fig2mesh.place import PlaceRequest
+        from fig2mesh.convert.place import PlaceRequest
 
         fields = PlaceRequest.__dataclass_fields__
         request = PlaceRequest(**{name: self.values[name] for name in fields})
@@ -77,7 +81,7 @@ class RowRequest:
 
     def sheet(self) -> MapSheet | None:
         """The map that the place is from, if any. Raises InputError."""
-        from fig2mesh.place import open_map
+        from fig2mesh.convert.place import open_map
 
         if self.place.map_sheet is None:
             return open_map(self.place)
@@ -112,7 +116,7 @@ class RowRequest:
 
     def check_words(self) -> None:
         """Check all that can be without reading the figure. Raises InputError."""
-        from fig2mesh.convert import settings_of
+        from fig2mesh.convert.asset import settings_of
 
         self.profile()
         settings_of(device="cpu", **self.settings())
@@ -131,8 +135,8 @@ class RowRequest:
         return {argument: self.values[name] for name, argument in names.items()} | {"bbox": self.values["bbox"]}
 
     def settings(self) -> dict[str, Any]:
-        """Arguments of `fig2mesh.convert.settings_of`, but for the device."""
-        from fig2mesh.convert import SETTING_OPTIONS
+        """Arguments of `fig2mesh.convert.asset.settings_of`, but for the device."""
+        from fig2mesh.convert.asset import SETTING_OPTIONS
 
         return {name: self.values[name] for name in SETTING_OPTIONS}
 
@@ -140,6 +144,6 @@ class RowRequest:
 @lru_cache(maxsize=8)
 def _open_map(request: PlaceRequest, digests: tuple[str, ...]) -> MapSheet | None:
     """The sheet of a request; the same one is read once."""
-    from fig2mesh.place import open_map
+    from fig2mesh.convert.place import open_map
 
     return open_map(request)

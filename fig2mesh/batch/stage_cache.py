@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 from fig2mesh.errors import InputError
 
 if TYPE_CHECKING:
-    from fig2mesh.pipeline import Step
+    from fig2mesh.convert.pipeline import Step
 
 log = logging.getLogger("fig2mesh")
 
@@ -87,7 +87,7 @@ class StageCache:
         return self.folder / key[:2] / f"{key}.npz"
 
     def _load(self, stage: str, key: str) -> Any:
-        from fig2mesh.stages import read_result
+        from fig2mesh.convert.stage_file import read_result
 
         if self.fresh or not self._path(key).is_file():
             return None
@@ -102,7 +102,7 @@ class StageCache:
         return found
 
     def _save(self, stage: str, key: str, value: Any) -> None:
-        from fig2mesh.stages import write_result
+        from fig2mesh.convert.stage_file import write_result
 
         try:
             self._path(key).parent.mkdir(parents=True, exist_ok=True)

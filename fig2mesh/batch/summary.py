@@ -17,7 +17,7 @@ from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.row_files import digest_of, stand
 from fig2mesh.batch.task import Task
 from fig2mesh.batch.tasks import read_spool
-from georef.json_file import parse_json
+from georef.untrusted.json_file import parse_json
 
 MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
 
@@ -98,9 +98,9 @@ def summarise(collection: Collection) -> Summary:
 
 def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Sequence[str]) -> None:
     """Write all files into an empty folder."""
-    from exporters.geopackage import write_geopackage
-    from exporters.stac import StacFile, StacItem, stac_file, write_stac
-    from exporters.tileset_files import write_tree
+    from exporters.gis.geopackage import write_geopackage
+    from exporters.gis.stac import StacFile, StacItem, stac_file, write_stac
+    from exporters.tiles.gather import write_tree
 
     with (stage / MANIFEST).open("w", encoding="utf-8", newline="\n") as stream:
         for task, record in _records(collection):

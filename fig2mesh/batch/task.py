@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.row_files import Roots
-from fig2mesh.batch.rows import Value
 
 
 @dataclass(frozen=True)

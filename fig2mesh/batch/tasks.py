@@ -10,12 +10,12 @@ from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Final
 
-from exporters.tiles import safe_name
+from exporters.tiles.tileset import safe_name
 from fig2mesh.batch.row_options import is_known
 from fig2mesh.batch.task import Task
 
 if TYPE_CHECKING:
-    from fig2mesh.batch.rows import Row
+    from fig2mesh.batch.collections.rows import Row
 
 LONGEST_NAME: Final = 60
 """Characters of a folder's name; file systems allow 255 bytes, and a character takes up to four."""

@@ -16,16 +16,18 @@ from urllib.parse import unquote, urlsplit
 
 from exporters.errors import DAMAGE
 from exporters.georeference import placement_of_record
-from exporters.gltf_reader import Gltf, read_gltf
+from exporters.gltf.reader import Gltf, read_gltf
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
-from georef.json_file import is_there, read_json
+from georef.untrusted.json_file import is_there, read_json
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
+# fmt: off
 SUFFIXES: dict[str, Kind] = {
     ".glb": "model", ".gltf": "model", ".json": "tileset", ".czml": "czml", ".geojson": "geojson",
-}  # fmt: skip
+}
+# fmt: on
 
 
 @dataclass(frozen=True)

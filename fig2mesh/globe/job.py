@@ -8,10 +8,10 @@ import secrets
 import shutil
 from pathlib import Path
 
+from fig2mesh.convert.job import configure_logging
 from fig2mesh.errors import OutputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
-from fig2mesh.job import configure_logging
 from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.server import page_server, show
 

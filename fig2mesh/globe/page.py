@@ -83,9 +83,7 @@ def globe_page(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = (
 
 def page_files(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = ()) -> dict[str, Path]:
     """Address → file, for all that the page loads except CesiumJS."""
-    found = {
-        _address(index, name): each.folder / name for index, each in enumerate(assets) for name in each.files
-    }  # fmt: skip
+    found = {_address(index, name): each.folder / name for index, each in enumerate(assets) for name in each.files}
     return found | {_overlay(index, each): each.image for index, each in enumerate(overlays)}
 
 

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from fig2mesh.counters import count
 from fig2mesh.field.body import Body
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
 
@@ -93,9 +93,20 @@ def drawn_faces(mesh: Mesh) -> NDArray[np.bool_]:
     return seen
 
 
-_LOOKS = np.array([
-    [1, 1, 1], [0.9, 0.05, 0.05], [0.05, 0.9, 0.05], [0.05, 0.05, 0.9], [1, 1, 0], [0, 1, 1], [1, 0, 1],
-]) / np.array([3, 1, 1, 1, 2, 2, 2])[:, None]  # fmt: skip
+_LOOKS = (
+    np.array(
+        [
+            [1, 1, 1],
+            [0.9, 0.05, 0.05],
+            [0.05, 0.9, 0.05],
+            [0.05, 0.05, 0.9],
+            [1, 1, 0],
+            [0, 1, 1],
+            [1, 0, 1],
+        ]
+    )
+    / np.array([3, 1, 1, 1, 2, 2, 2])[:, None]
+)
 """Barycentric coordinates at which triangles are looked at."""
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fig2mesh.doctor import SYSTEM_LIBRARIES
 from fig2mesh.errors import InputError
+from fig2mesh.libraries import SYSTEM_LIBRARIES
 from fig2mesh.mesh.topology import as_mesh
 from fig2mesh.records import Mesh
 

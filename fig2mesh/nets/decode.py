@@ -22,7 +22,7 @@ import torch
 from numpy.typing import NDArray
 
 from fig2mesh.nets.disn import Disn, Features, as_input
-from fig2mesh.parts.kinds import MIRRORED, PART_KIND
+from fig2mesh.skeleton import MIRRORED, PART_KIND
 
 STRIDES: Final = (4, 2, 1)
 BAND: Final = 0.0

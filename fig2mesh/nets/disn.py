@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from fig2mesh.parts.kinds import ANCHORS
+from fig2mesh.skeleton import ANCHORS
 
 MASK: Final = 64
 """Pixels of a mask's edge; §4.2, "64x64px masks"."""
@@ -130,10 +130,13 @@ class Disn(nn.Module):
         self.shape = shape
         self.levels = nn.ModuleList(
             nn.Sequential(
-                nn.Conv2d(c_in, c_out, 3, stride=2, padding=1), nn.ReLU(),
-                nn.Conv2d(c_out, c_out, 3, padding=1), nn.ReLU(),
-            ) for c_in, c_out in itertools.pairwise((1, *FILTERS))
-        )  # fmt: skip
+                nn.Conv2d(c_in, c_out, 3, stride=2, padding=1),
+                nn.ReLU(),
+                nn.Conv2d(c_out, c_out, 3, padding=1),
+                nn.ReLU(),
+            )
+            for c_in, c_out in itertools.pairwise((1, *FILTERS))
+        )
         self.overall = nn.Linear(FILTERS[-1] * (MASK >> len(FILTERS)) ** 2, GLOBAL)
         self.point = _pointwise()
         pose = {}

@@ -106,9 +106,13 @@ class Encoder(nn.Module):
         self.stage64 = nn.Sequential(Widened(16, 64, 24, 3, 2), Widened(24, 144, 24, 3))
         self.stage32 = nn.Sequential(Widened(24, 144, 32, 5, 2), Widened(32, 192, 32, 5))
         self.stage16 = nn.Sequential(
-            Widened(32, 192, 64, 3, 2), Widened(64, 384, 64, 3), Widened(64, 384, 64, 3), Widened(64, 384, 88, 5),
-            Widened(88, 528, 88, 5), Widened(88, 528, 88, 5),
-        )  # fmt: skip
+            Widened(32, 192, 64, 3, 2),
+            Widened(64, 384, 64, 3),
+            Widened(64, 384, 64, 3),
+            Widened(64, 384, 88, 5),
+            Widened(88, 528, 88, 5),
+            Widened(88, 528, 88, 5),
+        )
         self.stage8 = nn.Sequential(Widened(88, 528, 144, 5, 2), *(Widened(144, 864, 144, 5) for _ in range(3)))
         self.last = nn.Conv2d(144, 864, 1)
         self.last_filter = Depthwise(864, 3)

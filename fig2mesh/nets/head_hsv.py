@@ -43,18 +43,31 @@ class HeadHsv(nn.Module):
         self.shape = shape
         f = shape.filters
         self.shallow = nn.Sequential(
-            _conv(CHANNELS, f), _conv(f, f, 2), _conv(f, f), nn.Conv2d(f, 4 * f, 1), nn.PixelShuffle(2), nn.ReLU(),
+            _conv(CHANNELS, f),
+            _conv(f, f, 2),
+            _conv(f, f),
+            nn.Conv2d(f, 4 * f, 1),
+            nn.PixelShuffle(2),
+            nn.ReLU(),
             nn.Conv2d(f, 2, 3, 1, 1),
-        )  # fmt: skip
+        )
         self.encode = nn.Sequential(
-            _conv(CHANNELS, f, 2), _conv(f, 2 * f, 2), _conv(2 * f, 4 * f, 2), _conv(4 * f, 4 * f, 2), nn.Flatten(),
-            nn.Linear(4 * f * 16, shape.code), nn.ReLU(),
-        )  # fmt: skip
+            _conv(CHANNELS, f, 2),
+            _conv(f, 2 * f, 2),
+            _conv(2 * f, 4 * f, 2),
+            _conv(4 * f, 4 * f, 2),
+            nn.Flatten(),
+            nn.Linear(4 * f * 16, shape.code),
+            nn.ReLU(),
+        )
         self.spread = nn.Linear(shape.code, 4 * f * 16)
-        self.decode = nn.Sequential(*(
-            layer for inputs, outputs in ((4 * f, 4 * f), (4 * f, 2 * f), (2 * f, f), (f, f))
-            for layer in (nn.Upsample(scale_factor=2), _conv(inputs, outputs))
-        ))  # fmt: skip
+        self.decode = nn.Sequential(
+            *(
+                layer
+                for inputs, outputs in ((4 * f, 4 * f), (4 * f, 2 * f), (2 * f, f), (f, f))
+                for layer in (nn.Upsample(scale_factor=2), _conv(inputs, outputs))
+            )
+        )
         self.value = nn.Sequential(_conv(f + CHANNELS, f), nn.Conv2d(f, 1, 3, 1, 1))
         for layer in (self.shallow[-1], self.value[-1]):
             # Training starts at heads as they are.

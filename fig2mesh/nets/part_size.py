@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from fig2mesh.nets import weights
-from fig2mesh.parts.kinds import ANCHORS, KINDS, MIRRORED, PART_KIND, anchor_joints, part_centre
+from fig2mesh.skeleton import ANCHORS, KINDS, MIRRORED, PART_KIND, anchor_joints, part_centre
 
 NEURONS: Final = (20, 40, 20)
 OUTPUTS: Final = 4

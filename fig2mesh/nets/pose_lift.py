@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from fig2mesh.nets import weights
-from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import JOINT_MIRROR
 
 WIDTH: Final = 1024
 BLOCKS: Final = 2
@@ -31,6 +31,7 @@ DROPOUT: Final = 0.5
 ADDED: Final = ("eyes", "l_hand", "r_hand", "l_foot", "r_foot")
 """The five joints that the paper adds to the sixteen of Martinez et al."""
 
+# fmt: off
 BONES: Final = tuple(
     (JOINT[first.replace("*", side)], JOINT[second.replace("*", side)])
     for first, second in (
@@ -38,9 +39,11 @@ BONES: Final = tuple(
         ("pelvis", "thorax"), ("pelvis", "*_shoulder"),
     )
     for side in ("lr" if "*" in first + second else "l")
-)  # fmt: skip
+)
+# fmt: on
 """Pairs of joints whose drawn distances tell the scale; joints that both networks have."""
 
+# fmt: off
 LIMBS: Final = tuple(
     (JOINT[first.replace("*", side)], JOINT[second.replace("*", side)])
     for first, second in (
@@ -49,7 +52,8 @@ LIMBS: Final = tuple(
         ("*_hip", "*_knee"), ("*_knee", "*_ankle"), ("*_ankle", "*_foot"),
     )
     for side in ("lr" if "*" in second else "l")
-)  # fmt: skip
+)
+# fmt: on
 """Pairs of joints between which a drawn bone is foreshortened by its depth."""
 
 LONGEST: Final = 2.0

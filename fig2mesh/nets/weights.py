@@ -18,7 +18,7 @@ from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
 from fig2mesh.nets.disn import Disn, DisnShape
-from georef.json_file import parse_json
+from georef.untrusted.json_file import parse_json
 
 M = TypeVar("M", bound=nn.Module)
 
@@ -31,8 +31,10 @@ def save(path: Path, state: Mapping[str, Tensor], facts: Mapping[str, Any]) -> N
     """Write parameters as float16 (integers as they are) with what is known of them; facts : anything JSON holds."""
     from safetensors.torch import save_file
 
-    halves = {name: (value.half() if value.is_floating_point() else value).detach().cpu().contiguous()
-              for name, value in state.items()}  # fmt: skip
+    halves = {
+        name: (value.half() if value.is_floating_point() else value).detach().cpu().contiguous()
+        for name, value in state.items()
+    }
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
     save_file(halves, part, {KEY: json.dumps(dict(facts), sort_keys=True)})

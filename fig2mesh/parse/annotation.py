@@ -17,11 +17,13 @@ from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray, Dept
 KEYPOINTS, MASK, PART_LABELS = "keypoints.json", "mask.png", "part_labels.png"
 """Names of the files in a folder of annotations; the main job's options of the same names read them."""
 
+# fmt: off
 COLOURS = (
     (0, 0, 0), (230, 159, 0), (240, 228, 66), (86, 180, 233), (0, 114, 178), (120, 200, 240), (60, 90, 200),
     (170, 220, 255), (110, 130, 230), (0, 158, 115), (204, 121, 167), (110, 200, 120), (230, 150, 190), (170, 230, 150),
     (250, 190, 215), (120, 80, 40), (213, 94, 0), (150, 150, 150),
-)  # fmt: skip
+)
+# fmt: on
 """Colour of each label of `PART_NAMES` in pictures and pages: left limbs blue and green, right ones violet and pink."""
 
 

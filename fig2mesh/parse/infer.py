@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from fig2mesh.parse.joints import decode, doubts, visible_inside
 from fig2mesh.parse.silhouette import refine
-from fig2mesh.parts.kinds import JOINT_MIRROR
 from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, FloatArray
+from fig2mesh.skeleton import JOINT_MIRROR
 
 ROOM: Final = 0.12
 """Space round the figure in the second look, share of its size."""
@@ -157,15 +157,20 @@ def square(rgb: ByteArray, low: NDArray[np.floating], edge: float, size: int) ->
     if y0 < y1 and x0 < x1:
         canvas[y0 - top : y1 - top, x0 - left : x1 - left] = rgb[y0:y1, x0:x1]
     box = (low[0] - left, low[1] - top, low[0] - left + edge, low[1] - top + edge)
-    return np.asarray(Image.fromarray(canvas).resize((size, size), Image.Resampling.BOX if edge > 2 * size else
-                                                     Image.Resampling.BILINEAR, box=box))  # fmt: skip
+    return np.asarray(
+        Image.fromarray(canvas).resize(
+            (size, size), Image.Resampling.BOX if edge > 2 * size else Image.Resampling.BILINEAR, box=box
+        )
+    )
 
 
 def spread(values: FloatArray, seen: Look, shape: tuple[int, int]) -> FloatArray:
     """(H, W) values of a look's cells (n, n) at the picture's pixels; 0 outside the square."""
     size = values.shape[-1]
-    grid = [((np.arange(length) + 0.5 - low) / seen.edge * size) - 0.5
-            for length, low in zip(shape, seen.low[::-1], strict=True)]  # fmt: skip
+    grid = [
+        ((np.arange(length) + 0.5 - low) / seen.edge * size) - 0.5
+        for length, low in zip(shape, seen.low[::-1], strict=True)
+    ]
     rows, columns = np.meshgrid(*grid, indexing="ij")
     out = ndimage.map_coordinates(values, [rows, columns], order=1, mode="constant", cval=0.0)
     # The rim's half cells count as their cell.

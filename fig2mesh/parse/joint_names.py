@@ -12,6 +12,7 @@ from fig2mesh.records import JOINT_NAMES
 
 Point = NDArray[np.float64]
 
+# fmt: off
 SYNONYMS: dict[str, str] = {
     "mid_eyes": "eyes", "eye_center": "eyes", "eye_centre": "eyes",
     "head_center": "head", "head_centre": "head",
@@ -19,7 +20,8 @@ SYNONYMS: dict[str, str] = {
     "hip": "pelvis", "hips": "pelvis", "mid_hip": "pelvis", "root": "pelvis",
     "palm": "hand", "fingers": "hand", "finger": "hand", "middle_finger": "hand", "index": "hand",
     "toe": "foot", "toes": "foot", "big_toe": "foot", "foot_index": "foot",
-}  # fmt: skip
+}
+# fmt: on
 """Words of others for our joints, without their side. A hip with a side is the hip, one without the pelvis."""
 
 KNOWN = frozenset(JOINT_NAMES) | {"nose", "l_eye", "r_eye", "l_ear", "r_ear"}

@@ -10,11 +10,14 @@ from fig2mesh.records import JOINT_NAMES, BoolArray, FloatArray
 Document = dict[str, Any]
 Writer = Callable[[FloatArray, BoolArray, tuple[int, int], str], Document]
 
+# fmt: off
 LONG_NAMES = tuple(
     {"l_": "left_", "r_": "right_"}.get(name[:2], name[:2]) + name[2:] for name in JOINT_NAMES
-)  # fmt: skip
+)
+# fmt: on
 """left_shoulder instead of l_shoulder, as data sets have it."""
 
+# fmt: off
 SKELETON = (
     ("head", "eyes"), ("head", "neck"), ("neck", "thorax"), ("thorax", "pelvis"),
     *(
@@ -23,7 +26,8 @@ SKELETON = (
         for start, end in (("thorax", "shoulder"), ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "hand"),
                            ("pelvis", "hip"), ("hip", "knee"), ("knee", "ankle"), ("ankle", "foot"))
     ),
-)  # fmt: skip
+)
+# fmt: on
 """The bones, as pairs of joint names."""
 
 
@@ -46,27 +50,52 @@ def as_coco(joints: FloatArray, visible: BoolArray, size: tuple[int, int], pictu
     return {
         "images": [{"id": 1, "file_name": picture, "width": size[0], "height": size[1]}],
         "categories": [
-            {"id": 1, "name": "person", "supercategory": "person", "keypoints": list(LONG_NAMES),
-             "skeleton": [[place[start], place[end]] for start, end in SKELETON]},
+            {
+                "id": 1,
+                "name": "person",
+                "supercategory": "person",
+                "keypoints": list(LONG_NAMES),
+                "skeleton": [[place[start], place[end]] for start, end in SKELETON],
+            },
         ],
         "annotations": [
-            {"id": 1, "image_id": 1, "category_id": 1, "keypoints": flat, "num_keypoints": len(points), "bbox": box,
-             "area": round(box[2] * box[3], 2), "iscrowd": 0},
+            {
+                "id": 1,
+                "image_id": 1,
+                "category_id": 1,
+                "keypoints": flat,
+                "num_keypoints": len(points),
+                "bbox": box,
+                "area": round(box[2] * box[3], 2),
+                "iscrowd": 0,
+            },
         ],
-    }  # fmt: skip
+    }
 
 
 def as_labelme(joints: FloatArray, visible: BoolArray, size: tuple[int, int], picture: str) -> Document:
     """A LabelMe file with a point for each joint; hidden ones have the flag `hidden`."""
     shapes = [
-        {"label": name, "points": [[x, y]], "group_id": None, "description": "", "shape_type": "point",
-         "flags": {} if v else {"hidden": True}, "mask": None}
+        {
+            "label": name,
+            "points": [[x, y]],
+            "group_id": None,
+            "description": "",
+            "shape_type": "point",
+            "flags": {} if v else {"hidden": True},
+            "mask": None,
+        }
         for name, (x, y), v in zip(JOINT_NAMES, _rounded(joints), visible.tolist(), strict=True)
-    ]  # fmt: skip
+    ]
     return {
-        "version": "5.5.0", "flags": {}, "shapes": shapes, "imagePath": picture, "imageData": None,
-        "imageWidth": size[0], "imageHeight": size[1],
-    }  # fmt: skip
+        "version": "5.5.0",
+        "flags": {},
+        "shapes": shapes,
+        "imagePath": picture,
+        "imageData": None,
+        "imageWidth": size[0],
+        "imageHeight": size[1],
+    }
 
 
 def as_supervisely(joints: FloatArray, visible: BoolArray, size: tuple[int, int], picture: str) -> Document:
@@ -77,14 +106,19 @@ def as_supervisely(joints: FloatArray, visible: BoolArray, size: tuple[int, int]
     }
     figure = {"geometryType": "graph", "classTitle": "person", "description": "", "tags": [], "nodes": nodes}
     return {
-        "description": "", "name": picture, "tags": [], "size": {"width": size[0], "height": size[1]},
+        "description": "",
+        "name": picture,
+        "tags": [],
+        "size": {"width": size[0], "height": size[1]},
         "objects": [figure],
-    }  # fmt: skip
+    }
 
 
+# fmt: off
 WRITERS: dict[str, Writer] = {
     "fig2mesh": as_ours, "coco": as_coco, "labelme": as_labelme, "supervisely": as_supervisely,
-}  # fmt: skip
+}
+# fmt: on
 
 
 def _rounded(joints: FloatArray) -> list[tuple[float, float]]:

@@ -21,10 +21,12 @@ APART: Final = 0.06
 UNSURE: Final = 0.3
 """Likelihood below which a joint is reported."""
 
+# fmt: off
 BONES: Final = {
     "upper arm": ("shoulder", "elbow"), "lower arm": ("elbow", "wrist"), "upper leg": ("hip", "knee"),
     "lower leg": ("knee", "ankle"),
-}  # fmt: skip
+}
+# fmt: on
 
 UNEVEN: Final = 3.0
 """Left and right bones whose drawn lengths differ by more than this factor are reported where neither is short."""

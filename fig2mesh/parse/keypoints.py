@@ -15,7 +15,7 @@ from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_formats import Box, NamedPoints, named_points
 from fig2mesh.parse.joint_names import completed
 from fig2mesh.records import JOINT_NAMES, LIMBS, BoolArray, DepthOrder, FloatArray
-from georef.json_file import read_json
+from georef.untrusted.json_file import read_json
 
 MAX_BYTES = 4 << 20
 """Larger files are no joint files; reading them whole would only cost memory."""

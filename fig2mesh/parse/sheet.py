@@ -117,9 +117,7 @@ def _promising(rgb: ByteArray, edge: float) -> Iterator[NDArray[np.float64]]:
                 yield centre
 
 
-def _centred(
-    rgb: ByteArray, centre: NDArray[np.float64], edge: float
-) -> list[tuple[float, NDArray[np.float64]]]:  # fmt: skip
+def _centred(rgb: ByteArray, centre: NDArray[np.float64], edge: float) -> list[tuple[float, NDArray[np.float64]]]:
     """The box of the figure in a window and how surely it is one, after a look with it in the middle; or nothing."""
     box = box_of(look(rgb, centre, edge), rgb.shape[:2])
     if box is None:
@@ -151,9 +149,11 @@ def _tight(found: Inference, corner: tuple[int, int]) -> SheetFigure:
     x1 = min(int(max(columns[-1] + 1, np.ceil(high[0]))) + room, width)
     y1 = min(int(max(rows[-1] + 1, np.ceil(high[1]))) + room, height)
     inner = replace(
-        found, mask=found.mask[y0:y1, x0:x1], part_labels=found.part_labels[y0:y1, x0:x1],
+        found,
+        mask=found.mask[y0:y1, x0:x1],
+        part_labels=found.part_labels[y0:y1, x0:x1],
         joints_px=found.joints_px - np.array([x0, y0], np.float32),
-    )  # fmt: skip
+    )
     x, y = corner
     return SheetFigure((x + x0, y + y0, x + x1, y + y1), float(found.confidence.mean()), inner)
 

@@ -19,9 +19,11 @@ JOINTS = {"arm": ("shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", 
 PARTS = {"arm": ("upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}
 LIMBS = ("l_leg", "r_leg", "l_arm", "r_arm")
 
+# fmt: off
 USUAL_RADIUS = {
     "upper_arm": 0.055, "lower_arm": 0.045, "hand": 0.045, "upper_leg": 0.085, "lower_leg": 0.060, "foot": 0.050
-}  # fmt: skip
+}
+# fmt: on
 """Radii of a realistic body 1.79 units high; drawn ones are measured, these only bound them."""
 
 STOUT = 1.7
@@ -110,10 +112,17 @@ def make_limb(name: str, joints: NDArray[np.float64], visible: BoolArray) -> Lim
     points = np.concatenate(centres)
     radius = np.concatenate(usual)
     return Limb(
-        name, points, np.concatenate(depth), radius, radius.copy(), np.concatenate(part),
-        np.zeros((len(points), 2), bool), np.zeros((len(points), 2), bool), np.zeros((len(points), 2)),
+        name,
+        points,
+        np.concatenate(depth),
+        radius,
+        radius.copy(),
+        np.concatenate(part),
+        np.zeros((len(points), 2), bool),
+        np.zeros((len(points), 2), bool),
+        np.zeros((len(points), 2)),
         np.concatenate(seen),
-    )  # fmt: skip
+    )
 
 
 def measure(limb: Limb, canvas: Canvas, rivals: NDArray[np.float64]) -> Limb:

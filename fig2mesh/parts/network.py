@@ -18,9 +18,9 @@ from fig2mesh.counters import count
 from fig2mesh.field.distance import grid_distance
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.inflate import single_threaded
-from fig2mesh.parts.kinds import KINDS, PART_KIND, anchor_joints, part_centre
 from fig2mesh.parts.split import Split
 from fig2mesh.records import BODY_PARTS, PART, BoolArray, FloatArray, PartSdf, Pose3D
+from fig2mesh.skeleton import KINDS, PART_KIND, anchor_joints, part_centre
 
 if TYPE_CHECKING:
     from fig2mesh.nets.disn import Disn
@@ -65,11 +65,14 @@ def network_parts(
     grids = decode_many(nets, {part: (given.mask, given.anchors) for part, given in inputs.items()}, nodes)
     return tuple(
         PartSdf(
-            part, grids[part] * np.float32(given.edge / 2), given.centre.astype(np.float32), given.edge,
+            part,
+            grids[part] * np.float32(given.edge / 2),
+            given.centre.astype(np.float32),
+            given.edge,
             bool(given.mask.any()),
         )
         for part, given in inputs.items()
-    )  # fmt: skip
+    )
 
 
 class PartInput(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from fig2mesh.parse.frame import image_frame
+from fig2mesh.image_frame import image_frame
 from fig2mesh.records import BoolArray, ByteArray, Figure
 
 SPECK = 3.0
@@ -52,9 +52,14 @@ def clean(figure: Figure, voxel: float, most_px: int) -> tuple[Figure, int, int]
         labels = np.where(mask, labels, 0)
     corner = (figure.origin_px[0] + figure.step_px * x0, figure.origin_px[1] + figure.step_px * y0)
     cut = replace(
-        figure, rgba=rgba, mask=mask, joints_px=joints, part_labels=labels,
-        origin_px=corner, step_px=figure.step_px * max(factor, 1),
-    )  # fmt: skip
+        figure,
+        rgba=rgba,
+        mask=mask,
+        joints_px=joints,
+        part_labels=labels,
+        origin_px=corner,
+        step_px=figure.step_px * max(factor, 1),
+    )
     return cut, int(kept.sum()), int((~kept).sum())
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.counters import count
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import JOINT, Figure, Pose3D
 
 STRAIGHT = 0.8

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import JOINT, Figure, Pose3D
 
 FORESHORTENED = 0.8

@@ -377,9 +377,22 @@ def render_tiles(
                         clear_pixel(row, column, colour, depth, parts, normals)
                 continue
             used, normals_here, samples_here = render_tile(
-                grids, space, view, spans, tile_row, tile_column, found, near, candidates, tolerance,
-                colouring, colour, depth, parts, normals,
-            )  # fmt: skip
+                grids,
+                space,
+                view,
+                spans,
+                tile_row,
+                tile_column,
+                found,
+                near,
+                candidates,
+                tolerance,
+                colouring,
+                colour,
+                depth,
+                parts,
+                normals,
+            )
             rays += (last_row - tile_row * TILE) * (last_column - tile_column * TILE)
             cells += used
             computed += normals_here

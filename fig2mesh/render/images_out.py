@@ -122,9 +122,15 @@ def _gif(file: Path, pictures: Iterable[ByteArray], fps: float) -> None:
     first, *others = (_indexed(picture) for picture in pictures)
     # Each picture replaces the one before, also where it is transparent.
     first.save(
-        file, "GIF", save_all=True, append_images=others, duration=round(100 / fps) * 10, loop=0, disposal=2,
+        file,
+        "GIF",
+        save_all=True,
+        append_images=others,
+        duration=round(100 / fps) * 10,
+        loop=0,
+        disposal=2,
         optimize=False,
-    )  # fmt: skip
+    )
 
 
 def _indexed(picture: ByteArray) -> Image.Image:

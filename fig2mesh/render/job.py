@@ -12,9 +12,9 @@ from typing import Any
 
 from PIL import ImageColor
 
-from fig2mesh.convert import torch_device
+from fig2mesh.convert.asset import torch_device
+from fig2mesh.convert.job import check_text, configure_logging, write_text
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.job import check_text, configure_logging, write_text
 from fig2mesh.parse.read import read_figure
 from fig2mesh.records import ByteArray, Figure
 from fig2mesh.render.counts import Counts
@@ -105,10 +105,18 @@ def run(
     if sun is not None and not sun.up:
         log.info("the sun is %.1f° below the horizon: only the sky's light is left", -sun.elevation_deg)
     request = Request(
-        mode, wanted, size, yaw, pitch, samples, paper, ground,
+        mode,
+        wanted,
+        size,
+        yaw,
+        pitch,
+        samples,
+        paper,
+        ground,
         towards_sun(sun, bearing) if sun is not None and sun.up else None,
-        outline_width, _colour("--outline-colour", outline_colour),
-    )  # fmt: skip
+        outline_width,
+        _colour("--outline-colour", outline_colour),
+    )
 
     start = time.perf_counter()
     if fields:
@@ -145,10 +153,10 @@ def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Ite
 
 def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldScene:
     """The part fields of a figure and, where the request shows them, its colours; nothing is meshed."""
-    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.convert.pipeline import make_only, steps
+    from fig2mesh.image_frame import image_frame
     from fig2mesh.parts.pieces import clean
     from fig2mesh.parts.smooth_union import smooth_union
-    from fig2mesh.pipeline import make_only, steps
 
     figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
     textures = needs(request.mode, request.effects).textures

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
 from exporters.errors import DAMAGE, ExportError
-from exporters.gltf_reader import MESHOPT, Gltf, read_gltf
+from exporters.gltf.reader import MESHOPT, Gltf, read_gltf
 from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
-from fig2mesh.measure import load_textured
+from fig2mesh.measure.model import load_textured
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
 """Files that are models; everything else is taken for a drawing."""
@@ -55,7 +55,7 @@ def _check_costs(gltf: Gltf) -> None:
 
 
 def _gltf_labels(gltf: Gltf) -> NDArray[np.uint8] | None:
-    """(V,) part label of each vertex, as `exporters.glb` writes them; None in files without."""
+    """(V,) part label of each vertex, as `exporters.gltf.glb` writes them; None in files without."""
     tables = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {}).get("propertyTables", [])
     attributes = gltf.items("meshes")[0]["primitives"][0]["attributes"]
     if "_PART" in attributes:

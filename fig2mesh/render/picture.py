@@ -84,9 +84,12 @@ class Picture:
 def view_of(scene: Scene, request: Request) -> View:
     """The camera of a request; the same for every yaw."""
     return make_view(
-        scene.bounds, request.size, request.pitch_deg,
-        nearby="perspective" in request.effects, ground=request.ground,
-    )  # fmt: skip
+        scene.bounds,
+        request.size,
+        request.pitch_deg,
+        nearby="perspective" in request.effects,
+        ground=request.ground,
+    )
 
 
 def render(scene: Scene, request: Request) -> Picture:
@@ -160,9 +163,16 @@ def _band(scene: Scene, request: Request, need: Needs, view: View, rows: tuple[i
 
 
 def _colours(
-    scene: Scene, request: Request, need: Needs, view: View, met: Surface, rays: Rays, depth: Floats,
-    on_floor: NDArray[np.bool_], seen: NDArray[np.intp],
-) -> tuple[Floats, Counts]:  # fmt: skip
+    scene: Scene,
+    request: Request,
+    need: Needs,
+    view: View,
+    met: Surface,
+    rays: Rays,
+    depth: Floats,
+    on_floor: NDArray[np.bool_],
+    seen: NDArray[np.intp],
+) -> tuple[Floats, Counts]:
     """(M, 3) sRGB 0-255 of the points before any light."""
     colours, counts = np.empty((len(seen), 3)), Counts()
     colours[on_floor] = GROUND
@@ -242,9 +252,16 @@ def _to_ground(origins: Floats, directions: Floats, bounds: Floats) -> Floats:
 
 
 def _ink(
-    scene: Scene, request: Request, view: View, met: Surface, points: Floats, normals: Floats,
-    seen: NDArray[np.intp], on_floor: NDArray[np.bool_], count: int,
-) -> Floats:  # fmt: skip
+    scene: Scene,
+    request: Request,
+    view: View,
+    met: Surface,
+    points: Floats,
+    normals: Floats,
+    seen: NDArray[np.intp],
+    on_floor: NDArray[np.bool_],
+    count: int,
+) -> Floats:
     columns = request.size[0]
     kinds = np.zeros(count, np.int16)
     # The rim of the ground is no line of the figure: ground and nothing are one kind.
@@ -253,6 +270,10 @@ def _ink(
     places[seen], ways[seen] = points, normals
     shape = (-1, columns)
     return ink_cover(
-        kinds.reshape(shape), places.reshape(*shape, 3), ways.reshape(*shape, 3),
-        view.height / request.size[1], height_of(scene), request.outline_px * request.samples,
-    )  # fmt: skip
+        kinds.reshape(shape),
+        places.reshape(*shape, 3),
+        ways.reshape(*shape, 3),
+        view.height / request.size[1],
+        height_of(scene),
+        request.outline_px * request.samples,
+    )

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from exporters.asset import TexturedMesh
 from fig2mesh.field.body import Body
 from fig2mesh.field.trace import trace
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.bake import drawn_colours, plain_colours
-from fig2mesh.parse.frame import ImageFrame
-from fig2mesh.preview import interpolated, mesh_colours, raycasting_scene
+from fig2mesh.mesh.preview import interpolated, mesh_colours, raycasting_scene
 from fig2mesh.records import Rays
 from fig2mesh.render.counts import Counts
 from fig2mesh.render.needs import Needs

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import framing
 from fig2mesh.field.compiled import sealed
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray
 from fig2mesh.texture.sources import Sources
 
@@ -118,11 +118,13 @@ def surface_colours(body: Body, sources: Sources, frame: ImageFrame) -> SurfaceC
     per_unit = 1.0 / frame.units_per_px
     x, y = frame.origin_px
     scale = sources.plain_scale
-    maps = np.array([
-        [per_unit, x - 0.5, -per_unit, y - 0.5],
-        [per_unit * scale, x * scale - 0.5, -per_unit * scale, y * scale - 0.5],
-        [1 / pixel, columns / 2 - centre[0] / pixel - 0.5, -1 / pixel, rows / 2 + centre[1] / pixel - 0.5],
-    ])  # fmt: skip
+    maps = np.array(
+        [
+            [per_unit, x - 0.5, -per_unit, y - 0.5],
+            [per_unit * scale, x * scale - 0.5, -per_unit * scale, y * scale - 0.5],
+            [1 / pixel, columns / 2 - centre[0] / pixel - 0.5, -1 / pixel, rows / 2 + centre[1] / pixel - 0.5],
+        ]
+    )
     return SurfaceColours(
         _halved(_packed(sources.seen)[None], one=True),
         _halved(np.stack([_packed(picture) for picture in pictures])),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import JOINT, Figure
 from fig2mesh.texture.pen import STROKE

@@ -15,7 +15,7 @@ from PIL import Image
 from scipy import ndimage
 from scipy.cluster.vq import kmeans2
 
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import PART, Figure
 from fig2mesh.texture.heads import back_of_head, drawn_face

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.evaluate_figures import Drawing, drawing_in
 from fig2mesh.field.body import Body
+from fig2mesh.measure.figures import Drawing, drawing_in
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
 
@@ -83,7 +83,7 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
 
 
 def _body(files: Drawing) -> Body:
-    from fig2mesh.pipeline import make_only, steps
+    from fig2mesh.convert.pipeline import make_only, steps
 
     results: dict[str, Any] = {"figure": read_figure(**files.arguments())}
     make_only("body", steps(PRESETS["standard"], 1.79), results)

@@ -15,10 +15,12 @@ from fig2mesh.tradeoff.measures import Measured, knee, pareto
 from fig2mesh.tradeoff.sweep import KNOBS, STAGES_OF
 from fig2mesh.tradeoff.tolerance import Tolerance
 
+# fmt: off
 COLUMNS: Final = (
     "figure", "knob", "value", "seconds", "stage_seconds", "peak_mb", "chamfer_mm", "hausdorff_mm", "normal_deg",
     "silhouette_iou", "front_ssim", "triangles", "failure",
-)  # fmt: skip
+)
+# fmt: on
 
 
 CROWD: Final = 0.15
@@ -83,10 +85,14 @@ def summary(figure: str, found: Sequence[Measured], tolerances: Sequence[Toleran
     ]
     lines[-1] = "\n".join([lines.pop(-2), lines[-1], *table])
     if tolerances:
-        head = ["| tolerance of the tracer | mean depth error mm | greatest mm | cells a ray | seconds |",
-                "|---:|---:|---:|---:|---:|"]  # fmt: skip
-        body = [f"| {t.tolerance:g} | {t.mean_mm:.4f} | {t.worst_mm:.3f} | {t.steps:.1f} | {t.seconds:.3f} |"
-                for t in tolerances]  # fmt: skip
+        head = [
+            "| tolerance of the tracer | mean depth error mm | greatest mm | cells a ray | seconds |",
+            "|---:|---:|---:|---:|---:|",
+        ]
+        body = [
+            f"| {t.tolerance:g} | {t.mean_mm:.4f} | {t.worst_mm:.3f} | {t.steps:.1f} | {t.seconds:.3f} |"
+            for t in tolerances
+        ]
         lines += ["Rays of four views of 512 x 512 pixels, against a tolerance of 1e-7:", "\n".join(head + body)]
     return "\n\n".join(lines) + "\n"
 
@@ -128,14 +134,21 @@ def _plot_front(found: Sequence[Measured], path: Path) -> None:
         if not m.chamfer_mm > 0 or m.run.knob == "finest":
             continue
         preset = m.run.knob in ("", "quality")
-        axes.scatter(m.run.total_s, m.chamfer_mm, s=60 if preset else 18, color="tab:red" if preset else "tab:blue",
-                     zorder=2)  # fmt: skip
+        axes.scatter(
+            m.run.total_s, m.chamfer_mm, s=60 if preset else 18, color="tab:red" if preset else "tab:blue", zorder=2
+        )
         # What lies beside the standard preset would only hide it.
         apart = abs(np.log(m.chamfer_mm / standard.chamfer_mm)) > CROWD
         if preset or apart or i in front:
             weight = "bold" if preset or i == front[best] else "normal"
-            axes.annotate(_name(m), (m.run.total_s, m.chamfer_mm), (5, 4), textcoords="offset points", fontsize=8,
-                          fontweight=weight)  # fmt: skip
+            axes.annotate(
+                _name(m),
+                (m.run.total_s, m.chamfer_mm),
+                (5, 4),
+                textcoords="offset points",
+                fontsize=8,
+                fontweight=weight,
+            )
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis in (axes.xaxis, axes.yaxis):

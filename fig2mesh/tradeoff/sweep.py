@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from exporters.asset import TexturedMesh
-from fig2mesh.paper import FIGURE_HEIGHT
 from fig2mesh.records import Figure
 from fig2mesh.settings import PRESETS, Settings
+from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 FINEST: Final = replace(PRESETS["fine"], voxel=0.004, spacing=0.005, triangles=120_000)
 """What errors are measured against: finer than any value of the sweep, but for the texture, which is as fine."""
@@ -34,11 +34,13 @@ KNOBS: Final[Mapping[str, tuple[Any, ...]]] = {
 }
 """Knob → values beside the standard preset's own; the others stay as in that preset. "quality" is all at once."""
 
+# fmt: off
 STAGES_OF: Final[Mapping[str, str]] = {
     "parts": "parts", "precision": "parts", "part_nodes": "parts", "canvas_px": "parts", "voxel": "parts",
     "spacing": "cloud", "mesher": "solid", "closing": "solid", "triangles": "simplify", "texture_size": "bake",
     "textures": "textures",
-}  # fmt: skip
+}
+# fmt: on
 """Knob → the stage that it is about."""
 
 
@@ -81,13 +83,13 @@ def requests(knobs: Sequence[str]) -> Iterator[tuple[str, str, Settings]]:
 
 def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
     """One run of the pipeline, timed; a fault of the figure is kept, not raised."""
+    from fig2mesh.asset_frame import asset_from_figure, on_drawing
+    from fig2mesh.convert.job import peak_mb
+    from fig2mesh.convert.pipeline import steps
     from fig2mesh.errors import FigureError
-    from fig2mesh.job import peak_mb
-    from fig2mesh.measure import front_similarity, silhouette_iou
-    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.image_frame import image_frame
+    from fig2mesh.measure.model import front_similarity, silhouette_iou
     from fig2mesh.parts.pieces import clean
-    from fig2mesh.pipeline import steps
-    from fig2mesh.placing import asset_from_figure, on_drawing
 
     seconds: dict[str, float] = {}
     try:

@@ -12,7 +12,7 @@ from PIL import Image
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import orthographic
 from fig2mesh.field.trace import trace
-from fig2mesh.parse.frame import ImageFrame
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray
 from fig2mesh.texture.sources import Sources
 

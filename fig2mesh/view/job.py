@@ -6,11 +6,11 @@ import logging
 from pathlib import Path
 from typing import Any
 
-from fig2mesh.convert import torch_device
+from fig2mesh.convert.asset import torch_device
+from fig2mesh.convert.job import check_text, configure_logging, progress, tell, write_text
+from fig2mesh.convert.place import PlaceRequest, open_map, place
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.job import check_text, configure_logging, progress, tell, write_text
 from fig2mesh.parse.read import read_figure
-from fig2mesh.place import PlaceRequest, open_map, place
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings, settings_for
 from fig2mesh.view.cesium import CESIUM, find_cesium
@@ -86,9 +86,9 @@ def scene_of(figure: Figure, settings: Settings, height_m: float, advance: Any =
 
     advance : told the name of each stage
     """
-    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.convert.pipeline import make_only, steps
+    from fig2mesh.image_frame import image_frame
     from fig2mesh.parts.pieces import clean
-    from fig2mesh.pipeline import make_only, steps
 
     figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
     results: dict[str, Any] = {"figure": figure, "pieces": pieces}

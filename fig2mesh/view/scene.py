@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fig2mesh.asset_frame import asset_from_figure
 from fig2mesh.field.body import Body
-from fig2mesh.parse.frame import ImageFrame
-from fig2mesh.placing import asset_from_figure
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import FloatArray, Pose3D
 from fig2mesh.texture.sources import Sources
 from fig2mesh.view.colour_atlas import ColourAtlas, DepthMap, colour_atlas, depth_map

@@ -16,12 +16,14 @@ from fig2mesh.errors import InputError
 
 log = logging.getLogger("fig2mesh")
 
+# fmt: off
 TYPES = {
     ".css": "text/css", ".czml": "application/json", ".geojson": "application/geo+json", ".gif": "image/gif",
     ".glb": "model/gltf-binary", ".gltf": "model/gltf+json", ".html": "text/html", ".jpeg": "image/jpeg",
     ".jpg": "image/jpeg", ".js": "text/javascript", ".json": "application/json", ".png": "image/png",
     ".svg": "image/svg+xml", ".wasm": "application/wasm", ".webp": "image/webp", ".xml": "application/xml",
-}  # fmt: skip
+}
+# fmt: on
 """Media types by suffix; not the system's, which on some Windows machines calls scripts plain text."""
 
 UNKNOWN = "application/octet-stream"

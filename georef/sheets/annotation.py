@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from georef.errors import PlacementError
-from georef.json_file import parse_json
 from georef.sheets.controls import MAX_POINTS, Controls, make_controls, read_text
+from georef.untrusted.json_file import parse_json
 
 GEOREFERENCING = "georeferencing"
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from georef.errors import PlacementError
-from georef.json_file import read_bytes
+from georef.untrusted.json_file import read_bytes
 
 FloatArray = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from georef.errors import PlacementError
-from georef.json_file import parse_json
 from georef.sheets.controls import FloatArray
+from georef.untrusted.json_file import parse_json
 
 if TYPE_CHECKING:
     from pyproj import CRS, Transformer

@@ -22,7 +22,7 @@ NAMES = ("farmer", "footballer", "market_woman")
 
 PARENT = """
 import json, resource, sys
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 code = main(sys.argv[1:])
 print(json.dumps({"event": "memory", "kb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss}))
 raise SystemExit(code)
@@ -45,8 +45,20 @@ def write_rows(path: Path, count: int, quality: str, seeds: bool) -> Path:
 
 def convert(collection: Path, out: Path, jobs: int, *more: str) -> dict[str, Any]:
     """Convert a collection; seconds as a whole, figures a minute of all and of those after each worker's first."""
-    words = ["batch", str(collection), "-o", str(out), "--jobs", str(jobs), "--root", FIGURES.anchor,
-             "--progress", "json", "-q", *more]  # fmt: skip
+    words = [
+        "batch",
+        str(collection),
+        "-o",
+        str(out),
+        "--jobs",
+        str(jobs),
+        "--root",
+        FIGURES.anchor,
+        "--progress",
+        "json",
+        "-q",
+        *more,
+    ]
     command = [sys.executable, "-c", PARENT, *words]
     start = time.perf_counter()
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -58,11 +70,13 @@ def convert(collection: Path, out: Path, jobs: int, *more: str) -> dict[str, Any
     ends = [event["t"] for event in events if event["event"] == "row"]
     later = ends[jobs:]
     return {
-        "rows": len(ends), "jobs": jobs, "seconds": round(seconds, 2),
+        "rows": len(ends),
+        "jobs": jobs,
+        "seconds": round(seconds, 2),
         "per_minute": round(60 * len(ends) / seconds, 2),
         "warm_per_minute": round(60 * len(later) / (later[-1] - ends[jobs - 1]), 2) if later else None,
         "parent_mb": round(events[-1]["kb"] / 1024, 1),
-    }  # fmt: skip
+    }
 
 
 def speedup(folder: Path, rows: int, quality: str) -> dict[str, Any]:

@@ -65,7 +65,7 @@ def subjects() -> list[Subject]:
     """The analytic mannequin in made-up colours, and two drawn examples."""
     from fig2mesh.field.analytic import mannequin
     from fig2mesh.field.body import Body
-    from fig2mesh.parse.frame import ImageFrame
+    from fig2mesh.image_frame import ImageFrame
     from fig2mesh.render.surface_colours import surface_colours
     from fig2mesh.texture.sources import Sources
 
@@ -79,9 +79,9 @@ def subjects() -> list[Subject]:
 
 def drawn(name: str) -> Subject:
     """An example of the repository at standard quality."""
-    from fig2mesh.parse.frame import image_frame
+    from fig2mesh.convert.pipeline import steps
+    from fig2mesh.image_frame import image_frame
     from fig2mesh.parse.read import read_figure
-    from fig2mesh.pipeline import steps
     from fig2mesh.render.surface_colours import surface_colours
     from fig2mesh.settings import PRESETS
 
@@ -181,7 +181,7 @@ def quick() -> tuple[Any, Callable[[], Any]]:
     """A body, and how its colours are made."""
     from fig2mesh.field.analytic import mannequin
     from fig2mesh.field.body import Body
-    from fig2mesh.parse.frame import ImageFrame
+    from fig2mesh.image_frame import ImageFrame
     from fig2mesh.render.surface_colours import surface_colours
     from fig2mesh.texture.sources import Sources
 

@@ -34,7 +34,7 @@ def arguments(target: Path, *more: str) -> list[str]:
 
 def whole_figures(folder: Path) -> dict[str, dict[str, Any]]:
     """The main job in a fresh process, and again in one that has already made a figure."""
-    from fig2mesh.cli import main
+    from fig2mesh.commands.main import main
 
     # Peak memory comes from the report: a child's maximum as the operating system counts it starts at its parent's.
     report = folder / "report.json"
@@ -76,7 +76,7 @@ def tracing() -> dict[str, dict[str, Any]]:
 
 def levels(folder: Path) -> dict[str, dict[str, Any]]:
     """Mean distance of a 5,000-triangle model to the full mesh."""
-    from fig2mesh.cli import main
+    from fig2mesh.commands.main import main
 
     report = folder / "lod.json"
     main(arguments(folder / "lod.glb", "--triangles", "5000", "--report", str(report)))
@@ -86,15 +86,15 @@ def levels(folder: Path) -> dict[str, dict[str, Any]]:
 
 def decoding() -> dict[str, dict[str, Any]]:
     """The 14 part fields of the farmer, coarse to fine and, a few parts only, node by node."""
+    from fig2mesh.image_frame import image_frame
     from fig2mesh.nets import weights
     from fig2mesh.nets.decode import decode_counted, decode_dense
-    from fig2mesh.parse.frame import image_frame
     from fig2mesh.parse.read import read_figure
     from fig2mesh.parts.canvas import make_canvas
-    from fig2mesh.parts.kinds import PART_KIND
     from fig2mesh.parts.network import network_inputs, shipped_sizes
     from fig2mesh.parts.split import split
     from fig2mesh.pose.network import lift_by_network
+    from fig2mesh.skeleton import PART_KIND
 
     figure = read_figure(FIGURE / "image.png", keypoints=FIGURE / "keypoints.json")
     frame = image_frame(figure)

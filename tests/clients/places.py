@@ -25,10 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import Asset, TexturedMesh
-from exporters.czml import write_czml
-from exporters.glb import write_glb
-from exporters.tiles import write_tileset
-from exporters.usd import write_usd
+from exporters.gis.czml import write_czml
+from exporters.gltf.glb import write_glb
+from exporters.tiles.tileset import write_tileset
+from exporters.usd.stage import write_usd
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server

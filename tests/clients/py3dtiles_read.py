@@ -27,8 +27,10 @@ def visit(tile, folder):
         else:
             batch = content.body.batch_table.header.data if isinstance(content, B3dm) else None
             found["contents"][str(tile.content_uri)] = {
-                "kind": type(content).__name__, "vertices": int(content.get_vertex_count()), "batch": batch,
-            }  # fmt: skip
+                "kind": type(content).__name__,
+                "vertices": int(content.get_vertex_count()),
+                "batch": batch,
+            }
     for child in tile.children:
         visit(child, folder)
 

@@ -15,7 +15,7 @@ from tests.clients.places import (
     PLACES,
     measure,
     table,
-)  # fmt: skip
+)
 
 
 @pytest.mark.slow

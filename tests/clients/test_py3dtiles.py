@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exporters.tiles import write_tileset
+from exporters.tiles.tileset import write_tileset
 from georef.geodesy import ecef_from_geodetic
 from tests import py3dtiles
 from tests.exporters.analytic import ZURICH, asset

@@ -13,7 +13,7 @@ from PIL import Image
 from examples.place_figure import run
 from exporters.inspect import inspect
 from exporters.validate import validate
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,9 +38,7 @@ def test_shipped_figures_become_valid_models(tmp_path: Path, name: str) -> None:
     assert len(np.unique(pixels // 32, axis=0)) > 20, "a picture of a coloured figure"
 
 
-def test_readme_commands_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:  # fmt: skip
+def test_readme_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     commands = readme_commands()

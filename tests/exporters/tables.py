@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from hypothesis import strategies as st
 
 from exporters.placed_figure import PlacedFigure, plain_attributes
-from fig2mesh.batch.rows import MAX_INTEGER
+from fig2mesh.batch.collections.rows import MAX_INTEGER
 from georef.placement import GeoPlacement
 from tests.georef.strategies import headings, heights, latitudes, longitudes
 
@@ -16,10 +16,12 @@ awkward_text = st.one_of(
     st.text(max_size=12), st.sampled_from(["", "=1+1", "+41", "-5", "@sum", "NULL", "1893", "true", "1e5", "Ä\n\t'\""])
 )
 borders = st.sampled_from([0, 2**53, 2**63, MAX_INTEGER])
+# fmt: off
 whole_numbers = st.builds(
     lambda border, step, sign: sign * min(border + step, MAX_INTEGER),
     borders, st.integers(-3, 3), st.sampled_from([1, -1]),
-)  # fmt: skip
+)
+# fmt: on
 values = st.one_of(
     st.none(), st.booleans(), st.integers(), whole_numbers, st.integers(-(2**63), 2**63 - 1), st.floats(), awkward_text
 )
@@ -27,10 +29,12 @@ column_names = st.one_of(
     st.sampled_from(["artist", "Year", "year", "fid", "geom", "name", "NAME", "name_2", "model", "rowid", "title", ""]),
     st.text(max_size=8),
 )
+# fmt: off
 places = st.builds(
     GeoPlacement, longitudes, latitudes, heights, st.sampled_from(["ellipsoid", "egm96"]), headings,
     altitude_mode=st.sampled_from(["absolute", "clamp"]),
-)  # fmt: skip
+)
+# fmt: on
 
 
 @st.composite
@@ -44,9 +48,19 @@ def tables(draw: st.DrawFn) -> list[PlacedFigure]:
 def figure(name: str, place: GeoPlacement, attributes: object = ()) -> PlacedFigure:
     """A figure of one file, `<name>/<name>.glb`."""
     return PlacedFigure(
-        name, place, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (f"{name}/{name}.glb",), (0.0,), "a b.png", "© A & B",
-        ("head", "torso"), (), 0.25, plain_attributes(attributes),  # type: ignore[arg-type]
-    )  # fmt: skip
+        name,
+        place,
+        (0.0, 0.0, 0.0),
+        (1.0, 1.0, 1.0),
+        (f"{name}/{name}.glb",),
+        (0.0,),
+        "a b.png",
+        "© A & B",
+        ("head", "torso"),
+        (),
+        0.25,
+        plain_attributes(attributes),  # type: ignore[arg-type]
+    )
 
 
 def many(count: int) -> Iterator[PlacedFigure]:

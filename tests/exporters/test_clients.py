@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from exporters.tiles import write_tileset
+from exporters.tiles.tileset import write_tileset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import ZURICH, asset, capsule
 from tests.node import RunScript

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exporters.part_borders import split_at_parts
-from exporters.tiles import write_tileset
-from exporters.tileset_files import write_figures
-from exporters.tileset_tree import tileset_documents
+from exporters.gltf.part_borders import split_at_parts
+from exporters.tiles.gather import write_figures
+from exporters.tiles.tileset import write_tileset
+from exporters.tiles.tree import tileset_documents
 from exporters.write import write
 from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.placement import GeoPlacement
 from tests import py3dtiles
 from tests.exporters.analytic import ZURICH, asset, capsule
 from tests.exporters.test_clients import HEADINGS, PLACES
-from tests.exporters.test_tileset_tree import HIGH, LOW, crowd
+from tests.exporters.tiles.test_tree import HIGH, LOW, crowd
 from tests.node import RunScript
 
 SMALL = (capsule(8, 2),)
@@ -50,10 +50,13 @@ def test_cesium_draws_just_the_figures_within_the_distance(
         (tmp_path / name).write_text(json.dumps(document))
     random = np.random.default_rng(5)
     views = [
-        {"lon_deg": 8.5 + x * visible_from / 111e3, "lat_deg": 47.4 + y * visible_from / 111e3,
-         "height_m": 5000 + z * visible_from}
+        {
+            "lon_deg": 8.5 + x * visible_from / 111e3,
+            "lat_deg": 47.4 + y * visible_from / 111e3,
+            "height_m": 5000 + z * visible_from,
+        }
         for x, y, z in random.uniform([-2, -2, 0], [2, 2, 0.9], (12, 3)).tolist()
-    ]  # fmt: skip
+    ]
     first = figures[0].placement
     views.append({"lon_deg": first.lon_deg, "lat_deg": first.lat_deg, "height_m": first.height_m + visible_from / 2})
     views.append({"lon_deg": -170.0, "lat_deg": -40.0, "height_m": 10.0})

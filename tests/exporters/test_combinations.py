@@ -88,9 +88,7 @@ def test_all_pairs_are_there() -> None:
 
 
 @pytest.mark.slow
-def test_validators_are_clean(
-    tmp_path: Path, node: RunScript, codecs: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_validators_are_clean(tmp_path: Path, node: RunScript, codecs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NODE_PATH", str(codecs))
     models: list[Path] = []
     for number, choice in enumerate(COMBINATIONS):

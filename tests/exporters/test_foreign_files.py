@@ -14,7 +14,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, Vt
 
 from exporters.findings import Finding
-from exporters.gltf_reader import read_gltf
+from exporters.gltf.reader import read_gltf
 from exporters.inspect import inspect
 from exporters.validate import validate
 from exporters.write import write
@@ -55,9 +55,13 @@ def _gltf(path: Path, **changes: Any) -> Path:
             rows, more = np.pad(rows, ((0, 0), (0, 1))), {"byteStride": 4}
         views.append({"buffer": 0, "byteOffset": len(data), "byteLength": rows.nbytes, **more})
         accessors.append(
-            {"bufferView": len(views) - 1, "componentType": types[values.dtype.str[1:]], "count": len(values),
-             "type": kind}
-        )  # fmt: skip
+            {
+                "bufferView": len(views) - 1,
+                "componentType": types[values.dtype.str[1:]],
+                "count": len(values),
+                "type": kind,
+            }
+        )
         data += rows.tobytes() + bytes(-rows.nbytes % 4)
     accessors[0] |= {"min": [0, 0, 0], "max": [1, 1, 0]}
     accessors[5] |= {"min": [0, 0, 0], "max": [127, 127, 0], "normalized": True}
@@ -70,9 +74,11 @@ def _gltf(path: Path, **changes: Any) -> Path:
     morph = {"componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0, 1], "sparse": sparse}
     accessors.append(morph)
     strip = {
-        "attributes": {"POSITION": 0, "JOINTS_0": 2, "WEIGHTS_0": 3}, "indices": 1, "mode": 5,
+        "attributes": {"POSITION": 0, "JOINTS_0": 2, "WEIGHTS_0": 3},
+        "indices": 1,
+        "mode": 5,
         "targets": [{"POSITION": 6}],
-    }  # fmt: skip
+    }
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "another program"},
         "extensionsUsed": ["KHR_mesh_quantization"],

@@ -9,7 +9,7 @@ import pytest
 
 from exporters.errors import ExportError
 from exporters.inspect import inspect
-from exporters.tileset_files import write_figures
+from exporters.tiles.gather import write_figures
 from exporters.write import FORMATS, write
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import EXACT_VOLUME, ZURICH, asset, capsule

@@ -16,11 +16,11 @@ from scipy.spatial import cKDTree
 
 from exporters.asset import Asset, Texture, TexturedMesh
 from exporters.errors import ExportError
-from exporters.glb import glb_bytes, write_glb, write_gltf
-from exporters.gltf_reader import Gltf, read_gltf
+from exporters.gltf.glb import glb_bytes, write_glb, write_gltf
+from exporters.gltf.ktx2 import size_of
+from exporters.gltf.part_borders import split_at_parts
+from exporters.gltf.reader import Gltf, read_gltf
 from exporters.inspect import inspect
-from exporters.ktx2 import size_of
-from exporters.part_borders import split_at_parts
 from exporters.profiles import PROFILES, profile_named
 from exporters.validate import validate
 from exporters.write import check_outputs, write
@@ -31,6 +31,7 @@ CESIUM = PROFILES["cesiumjs"]
 STEP = HEIGHT / 65535
 """Of a position: the capsule's longest side in 65535 steps."""
 
+# fmt: off
 VARIANTS: dict[str, Asset] = {
     "all": asset(ZURICH, lit=True),
     "vertex colours, no normals": asset(
@@ -43,7 +44,8 @@ VARIANTS: dict[str, Asset] = {
     ),
     "uint32 indices": asset(lods=(capsule(600, 40),)),
     "a kilometre": asset(lods=(capsule(vertices=capsule().vertices * 1000 + (200, 0, -70)),)),
-}  # fmt: skip
+}
+# fmt: on
 
 
 @pytest.fixture

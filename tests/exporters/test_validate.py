@@ -282,9 +282,7 @@ def test_what_cannot_be_checked_is_said(tmp_path: Path, name: str) -> None:
         validate(tmp_path / name)
 
 
-def test_khronos_findings_are_among_them(
-    tmp_path: Path, node_modules: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_khronos_findings_are_among_them(tmp_path: Path, node_modules: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NODE_PATH", str(node_modules))
     write(SMALL, tmp_path / "a.gltf")
     assert validate(tmp_path / "a.gltf") == []

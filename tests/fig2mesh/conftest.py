@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.drawn import DrawnFiles, write_figure
 
 ZURICH = ("8.5417", "47.3769")

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.field.body import Body
-from fig2mesh.measure_front import flange_share, look
-from fig2mesh.measure_solid import inner_shells
+from fig2mesh.measure.front import flange_share, look
+from fig2mesh.measure.solid import inner_shells
 from fig2mesh.mesh.topology import check_solid
 from fig2mesh.records import JOINT, PART, PART_NAMES
 from tests.drawn import Assembled, Sketch, assemble
@@ -158,11 +158,13 @@ def hand_on_the_hip() -> Assembled:
     return assemble(sketch.figure(), {"l_elbow": 0.0, "l_wrist": 0.08, "l_hand": 0.12})
 
 
+# fmt: off
 ONE_PIECE: tuple[Callable[[], Assembled], ...] = (
     standing, limbs_apart_in_depth, arm_far_before_the_belly, crossed_legs, spread_fingers, brimmed_hat, gown, skirt,
     long_hair, stick_figure, hand_before_the_chin, forearm_before_the_throat, folded_arms, hand_on_the_hip,
     arm_far_before_its_own_shoulder,
-)  # fmt: skip
+)
+# fmt: on
 TWO_PIECES: tuple[Callable[[], Assembled], ...] = (blob, pictogram)
 ALL = (*ONE_PIECE, *TWO_PIECES)
 

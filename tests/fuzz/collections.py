@@ -13,16 +13,18 @@ from typing import Any
 from georef.errors import InputError
 from tests.fuzz.seeds import STEM, Input, alone
 
+# fmt: off
 TABLE: list[dict[str, Any]] = [
     {"figure": f"{STEM}.csv", "name": "Anna", "lon": 8.5, "lat": 47.25, "triangles": 4000, "artist": "=1+1"},
     {"figure": "b.png", "name": "Böb, \"the\" second\nline", "lon": -8.0, "lat": 1e-9, "altitude": 400.0},
     {"figure": "../c.png", "lon": 8.0, "lat": 47.0, "bbox": "1 2 30 40", "evidence": "no", "date": "1893"},
-]  # fmt: skip
+]
+# fmt: on
 
 
 def collections() -> Iterator[Input]:
     """The same table as every kind of collection."""
-    from tests.fig2mesh.batch.tables import WRITERS
+    from tests.fig2mesh.batch.collections.tables import WRITERS
 
     with tempfile.TemporaryDirectory() as name:
         for file, write in WRITERS.items():
@@ -36,7 +38,7 @@ def collections() -> Iterator[Input]:
 
 def read_collection(path: Path) -> None:
     """Rows, their names, and what they ask for."""
-    from fig2mesh.batch.collection import read_rows
+    from fig2mesh.batch.collections.read import read_rows
     from fig2mesh.batch.row_files import Roots
     from fig2mesh.batch.row_request import RowRequest
     from fig2mesh.batch.task import Batch

@@ -15,16 +15,22 @@ from typing import Any
 Mutation = Callable[[bytes, random.Random], bytes]
 
 LENGTHS = (0, 1, 2, 3, 7, 127, 128, 255, 256, 32767, 32768, 65535, 65536, 2**24, 2**31 - 1, 2**31, 2**32 - 1)
+# fmt: off
 NUMBERS: tuple[Any, ...] = (
     0, -1, 1, 2, 255, 65535, 2**31 - 1, 2**31, 2**32, 2**53, 2**63, 2**64, 10**30, 10**400, -(2**63), 0.5, -0.0, 1e-320,
     1e308, -1e308, float("inf"), float("-inf"), float("nan"), 1e9, 1e18, 5126,
-)  # fmt: skip
+)
+# fmt: on
+# fmt: off
 WORDS = ("nan", "inf", "-inf", "1e308", "-1e999", "0", "-1", "1e-320", "2147483648", "9" * 400, "0x10", "1_0", "1,5",
-         "٣", "", "true", "null", "\0", "\ufeff", "é", "#", '"', "\\")  # fmt: skip
+         "٣", "", "true", "null", "\0", "\ufeff", "é", "#", '"', "\\")
+# fmt: on
+# fmt: off
 TEXTS: tuple[str, ...] = (
     "", "x" * 20_000, "\0", "\ud800", "../../../../etc/passwd", "/dev/zero", "a/" * 2000, "%00", "%2e%2e%2f", "data:,",
     "data:image/png;base64,AAAA", "http://localhost/a", "\x1b[2J\n\n", "<svg>", "main.json", "main.glb", "POSITION",
-)  # fmt: skip
+)
+# fmt: on
 
 
 def damaged_bytes(data: bytes, rng: random.Random) -> bytes:
@@ -239,11 +245,19 @@ def damaged_png(data: bytes, rng: random.Random) -> bytes:
         chunks[0] = (chunks[0][0], bytes(head))
     elif kind == 4:
         packed = zlib.compress(bytes(3_000_000), 9)
-        bomb = rng.choice((
-            (b"zTXt", b"k\0\0" + packed), (b"iTXt", b"k\0\1\0\0\0" + packed), (b"iCCP", b"k\0\0" + packed),
-            (b"IDAT", packed), (b"tEXt", b"k\0" + b"x" * 100_000), (b"eXIf", rng.randbytes(200)),
-            (b"acTL", struct.pack(">II", rng.choice(LENGTHS), 0)), (b"fcTL", bytes(26)), (b"PLTE", bytes(769)),
-        ))  # fmt: skip
+        bomb = rng.choice(
+            (
+                (b"zTXt", b"k\0\0" + packed),
+                (b"iTXt", b"k\0\1\0\0\0" + packed),
+                (b"iCCP", b"k\0\0" + packed),
+                (b"IDAT", packed),
+                (b"tEXt", b"k\0" + b"x" * 100_000),
+                (b"eXIf", rng.randbytes(200)),
+                (b"acTL", struct.pack(">II", rng.choice(LENGTHS), 0)),
+                (b"fcTL", bytes(26)),
+                (b"PLTE", bytes(769)),
+            )
+        )
         chunks.insert(rng.randrange(1, len(chunks)), bomb)
     else:
         head = bytearray(chunks[0][1])
@@ -266,8 +280,36 @@ def damaged_tiff(data: bytes, rng: random.Random) -> bytes:
         entry = start + 2 + 12 * rng.randrange(count)
         kind = rng.randrange(6)
         if kind == 0:
-            tags = (254, 256, 257, 258, 259, 262, 273, 274, 277, 278, 279, 284, 317, 322, 323, 324, 325, 338, 339, 347,
-                    33550, 33922, 34264, 34665, 34675, 34735, 34736, 34737)  # fmt: skip
+            tags = (
+                254,
+                256,
+                257,
+                258,
+                259,
+                262,
+                273,
+                274,
+                277,
+                278,
+                279,
+                284,
+                317,
+                322,
+                323,
+                324,
+                325,
+                338,
+                339,
+                347,
+                33550,
+                33922,
+                34264,
+                34665,
+                34675,
+                34735,
+                34736,
+                34737,
+            )
             struct.pack_into(order + "H", found, entry, rng.choice(tags))
         elif kind == 1:
             struct.pack_into(order + "H", found, entry + 2, rng.randrange(20))
@@ -340,12 +382,14 @@ def damaged_safetensors(data: bytes, rng: random.Random) -> bytes:
     return struct.pack("<Q", len(text)) + text + data[8 + size :]
 
 
+# fmt: off
 BY_SUFFIX: dict[str, Mutation] = {
     ".json": damaged_json, ".geojson": damaged_json, ".czml": damaged_json, ".gltf": damaged_json,
     ".glb": damaged_glb, ".b3dm": damaged_b3dm, ".png": damaged_png, ".tif": damaged_tiff, ".npz": damaged_zip,
     ".pgw": damaged_text, ".points": damaged_text, ".prj": damaged_text, ".usda": damaged_text, ".obj": damaged_text,
     ".mtl": damaged_text, ".csv": damaged_text, ".safetensors": damaged_safetensors,
-}  # fmt: skip
+}
+# fmt: on
 """What suits a kind of file; any other is damaged as bytes."""
 
 

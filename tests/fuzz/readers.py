@@ -140,7 +140,7 @@ def read_drawn_model(path: Path) -> None:
 
 
 def read_stage(path: Path) -> None:
-    from fig2mesh.stages import load_stage
+    from fig2mesh.convert.stage_file import load_stage
 
     beside = path.with_name("stage")
     stage = beside.read_bytes().decode("ascii", "ignore") if beside.is_file() else "lift"

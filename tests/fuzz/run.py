@@ -84,8 +84,13 @@ def _process(
         str(folder),
         str(seconds),
     ]
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT),
-                                "VIPS_CONCURRENCY": "1", "TMPDIR": str(folder)}  # fmt: skip
+    environment = os.environ | {
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONPATH": str(ROOT),
+        "VIPS_CONCURRENCY": "1",
+        "TMPDIR": str(folder),
+    }
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=environment)
     done = threading.Event()
     stuck: list[bool] = []

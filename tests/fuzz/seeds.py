@@ -173,10 +173,13 @@ def annotations() -> Iterator[Input]:
     at = sheets.controls(12)
     places = sheets.lonlat(sheets.swiss(at))
     for transformation in (
-        {"type": "polynomial", "options": {"order": 1}}, {"type": "polynomial", "options": {"order": 2}},
-        {"type": "polynomial", "options": {"order": 3}}, {"type": "thinPlateSpline"}, {"type": "projective"},
+        {"type": "polynomial", "options": {"order": 1}},
+        {"type": "polynomial", "options": {"order": 2}},
+        {"type": "polynomial", "options": {"order": 3}},
+        {"type": "thinPlateSpline"},
+        {"type": "projective"},
         {"type": "helmert"},
-    ):  # fmt: skip
+    ):
         made = sheets.annotation(at, places, transformation=transformation)
         yield alone(".json", json.dumps(made).encode())
     crs = {"definition": "+proj=lcc +lat_0=47 +lon_0=8 +lat_1=46 +lat_2=48"}
@@ -275,7 +278,7 @@ def tilesets() -> Iterator[Input]:
     """Tilesets of one figure, with levels of detail, as b3dm, and of several figures."""
     import tempfile
 
-    from exporters.tileset_files import write_figures
+    from exporters.tiles.gather import write_figures
 
     levels = (body(), body(4, deviation_m=(0.01, 0.05)))
     yield written("tileset.json")
@@ -292,7 +295,7 @@ def tilesets() -> Iterator[Input]:
 
 def b3dms() -> Iterator[Input]:
     """Batched 3D models."""
-    from exporters.b3dm import b3dm_bytes
+    from exporters.tiles.b3dm import b3dm_bytes
 
     yield alone(".b3dm", b3dm_bytes(written("main.glb").files["main.glb"], "a.glb"))
 
@@ -333,9 +336,9 @@ def stage_files() -> Iterator[Input]:
     """Files of `--save-stages` with small records, named by what they hold."""
     import tempfile
 
+    from fig2mesh.convert.stage_file import save_stage
     from fig2mesh.mesh.solid import Meshing, Solid
     from fig2mesh.records import Mesh, PointCloud, Pose3D, UvMesh
-    from fig2mesh.stages import save_stage
 
     corner = np.eye(4, 3, dtype=np.float32)
     faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]], np.int32)

@@ -17,19 +17,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from exporters.b3dm import read_b3dm
 from exporters.errors import ExportError
 from exporters.figure_reader import read_figures
-from exporters.gltf_reader import read_gltf
+from exporters.gltf.reader import read_gltf
 from exporters.inspect import inspect
+from exporters.tiles.b3dm import read_b3dm
 from exporters.validate import validate
+from fig2mesh.convert.record_types import fits
+from fig2mesh.convert.stage_file import load_stage, save_stage
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.picture import read_rgba, read_view
 from fig2mesh.parse.window import is_large
-from fig2mesh.record_types import fits
 from fig2mesh.records import Mesh, Pose3D, UvMesh
 from fig2mesh.render.model import read_model
-from fig2mesh.stages import load_stage, save_stage
 from georef.errors import PlacementError
 from georef.heights import undulation_m
 from georef.mapsheet import read_sheet
@@ -151,12 +151,14 @@ def test_accessors_that_hold_more_than_the_file(tmp_path: Path) -> None:
 
 def test_rows_that_overlap_and_nodes_with_two_parents(tmp_path: Path) -> None:
     document: dict[str, Any] = {
-        "accessors": [POINTS], "bufferViews": [{"buffer": 0, "byteLength": 36, "byteStride": 1}],
-        "buffers": [{"byteLength": 36}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [POINTS],
+        "bufferViews": [{"buffer": 0, "byteLength": 36, "byteStride": 1}],
+        "buffers": [{"byteLength": 36}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
         # Each names the next one twice: 2^60 instances.
         "nodes": [{"children": [i + 1, i + 1]} for i in range(60)] + [{"mesh": 0}],
         "scenes": [{"nodes": [0]}],
-    }  # fmt: skip
+    }
     path = glb(tmp_path / "a.glb", document, bytes(36))
     with pytest.raises(ValueError, match="rows of 12 bytes every 1"):
         read_gltf(path).accessor(0)
@@ -169,10 +171,13 @@ def test_rows_that_overlap_and_nodes_with_two_parents(tmp_path: Path) -> None:
 def test_a_mesh_that_is_shown_a_million_times(tmp_path: Path) -> None:
     count = 3_000
     document: dict[str, Any] = {
-        "accessors": [{**POINTS, "count": count}], "bufferViews": [{"buffer": 0, "byteLength": 12 * count}],
-        "buffers": [{"byteLength": 12 * count}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "nodes": [{"mesh": 0}] * 10_000, "scenes": [{"nodes": list(range(10_000))}],
-    }  # fmt: skip
+        "accessors": [{**POINTS, "count": count}],
+        "bufferViews": [{"buffer": 0, "byteLength": 12 * count}],
+        "buffers": [{"byteLength": 12 * count}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}] * 10_000,
+        "scenes": [{"nodes": list(range(10_000))}],
+    }
     path = glb(tmp_path / "a.glb", document, bytes(12 * count))
     with pytest.raises(ExportError, match="far more than the file"):
         inspect(path)
@@ -257,7 +262,7 @@ def _member(head: str, data: bytes = b"") -> bytes:
         (_member("(" * 100), "not a stage file"),
         (b"", "not a stage file"),
     ],
-)  # fmt: skip
+)
 def test_arrays_whose_heads_lie(tmp_path: Path, member: bytes, finding: str) -> None:
     save_stage(tmp_path, "lift", Pose3D(np.zeros((21, 3), np.float32)))
     with zipfile.ZipFile(tmp_path / "lift.npz") as archive:
@@ -300,8 +305,18 @@ def test_a_stage_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
 
 def grid(**tags: tuple[int, int, int]) -> bytes:
     """A TIFF of one strip of 4 x 5 floats; tags : _NUMBER=(type, count, value) replaces an entry."""
-    entries = {256: (3, 1, 5), 257: (3, 1, 4), 258: (3, 1, 32), 259: (3, 1, 1), 262: (3, 1, 1), 273: (4, 1, 200),
-               277: (3, 1, 1), 278: (3, 1, 4), 279: (4, 1, 80), 339: (3, 1, 3)}  # fmt: skip
+    entries = {
+        256: (3, 1, 5),
+        257: (3, 1, 4),
+        258: (3, 1, 32),
+        259: (3, 1, 1),
+        262: (3, 1, 1),
+        273: (4, 1, 200),
+        277: (3, 1, 1),
+        278: (3, 1, 4),
+        279: (4, 1, 80),
+        339: (3, 1, 3),
+    }
     entries |= {int(name[1:]): value for name, value in tags.items()}
     data = struct.pack("<2sHIH", b"II", 42, 8, len(entries))
     for tag, (kind, count, value) in sorted(entries.items()):
@@ -324,15 +339,22 @@ def grid(**tags: tuple[int, int, int]) -> bytes:
         (b"II*\0" + bytes(12), "without a directory"),
         (b"no TIFF at all..", "no TIFF"),
     ],
-)  # fmt: skip
+)
 def test_geoid_grids_that_end_the_process_in_proj(tmp_path: Path, data: bytes, finding: str) -> None:
     (tmp_path / "a.tif").write_bytes(data)
     with pytest.raises(PlacementError, match=finding):
         undulation_m(8.1, 46.9, tmp_path / "a.tif")
 
 
-@pytest.mark.parametrize("head", [(46.0, 7.0, 0.5, 0.5, 2**30, 2**30), (46.0, 7.0, 0.0, 0.5, 2, 2),
-                                  (float("nan"), 7.0, 0.5, 0.5, 2, 2), (46.0, 7.0, 0.5, 0.5, -2, 2)])  # fmt: skip
+@pytest.mark.parametrize(
+    "head",
+    [
+        (46.0, 7.0, 0.5, 0.5, 2**30, 2**30),
+        (46.0, 7.0, 0.0, 0.5, 2, 2),
+        (float("nan"), 7.0, 0.5, 0.5, 2, 2),
+        (46.0, 7.0, 0.5, 0.5, -2, 2),
+    ],
+)
 def test_gtx_grids_whose_heads_lie(tmp_path: Path, head: tuple[float, ...]) -> None:
     (tmp_path / "a.gtx").write_bytes(struct.pack(">4d2i", *head) + bytes(16))
     with pytest.raises(PlacementError, match="its head says"):

@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from fig2mesh.field.body import Body
+from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.solid import make_solid
-from fig2mesh.parse.frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import outline_parts
 from fig2mesh.pose.prior import lift

@@ -22,6 +22,7 @@ SECTIONS = {
     "test_determinism": "Determinism",
 }
 
+# fmt: off
 ELSEWHERE = (
     ("Poles, antimeridian, ±1e-9°, −500 m to 100 km: longitude, latitude, height ↔ ECEF within 1e-8 m",
      "tests/georef/test_geodesy.py", "test_geodetic_round_trip"),
@@ -43,7 +44,8 @@ ELSEWHERE = (
      "test_a_part_cut_by_its_cube_ends_there"),
     ("Limbs in any pose, crossing and stretched, are one closed solid", "tests/fig2mesh/parts/test_any_pose.py",
      "test_every_figure_is_one_closed_solid_with_the_drawn_silhouette"),
-)  # fmt: skip
+)
+# fmt: on
 """(what, file, test): hard cases that the suites of the packages hold already."""
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from exporters.gltf_reader import read_gltf
+from exporters.gltf.reader import read_gltf
 from exporters.validate import validate
 from fig2mesh.texture.pen import find_pen, reinked, without_contour
 from fig2mesh.texture.sources import _dominant, _ink, _palette, continued

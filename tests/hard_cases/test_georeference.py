@@ -11,11 +11,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from exporters.asset import Asset
-from exporters.glb import write_glb
-from exporters.gltf_reader import read_gltf
-from exporters.part_borders import split_at_parts
-from exporters.tiles import write_tileset
-from fig2mesh.place import PlaceRequest, placement_of
+from exporters.gltf.glb import write_glb
+from exporters.gltf.part_borders import split_at_parts
+from exporters.gltf.reader import read_gltf
+from exporters.tiles.tileset import write_tileset
+from fig2mesh.convert.place import PlaceRequest, placement_of
 from georef.geodesy import ecef_from_asset, ecef_from_geodetic, geodetic_from_ecef, tile_from_asset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import HEIGHT, asset

@@ -83,7 +83,7 @@ def peak_mb(arguments: list[str]) -> float:
     Not what `getrusage` says: that starts at what the parent had when it forked, and a test run has grown by then.
     """
     program = (
-        "import re, sys\nfrom pathlib import Path\nfrom fig2mesh.cli import main\ncode = main(sys.argv[1:])\n"
+        "import re, sys\nfrom pathlib import Path\nfrom fig2mesh.commands.main import main\ncode = main(sys.argv[1:])\n"
         "status = Path('/proc/self/status').read_text()\n"
         "print(code, int(re.search(r'VmHWM:\\s*(\\d+)', status)[1]) / 1024)"
     )

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.topology import check_solid
-from fig2mesh.parse.frame import image_frame
 from fig2mesh.pose.network import lift_by_network
 from fig2mesh.records import JOINT_NAMES, Figure
 from tests.hard_cases.case import Worst, drawn, hard_case

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
-from fig2mesh.measure import load_textured
+from fig2mesh.measure.model import load_textured
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.simplify import simplify
 from fig2mesh.mesh.topology import check_solid, join

@@ -74,9 +74,11 @@ def test_saved_files_read_back_as_they_were(files: DrawnFiles, tmp_path: Path) -
     folder = tmp_path / "deep" / "saved"
     write_annotation(folder, annotation, "drawn.png")
     figure = read_figure(
-        files.image, mask=folder / "mask.png", keypoints=folder / "keypoints.json",
+        files.image,
+        mask=folder / "mask.png",
+        keypoints=folder / "keypoints.json",
         part_labels=folder / "part_labels.png",
-    )  # fmt: skip
+    )
     again = Annotation(figure.mask, figure.joints_px, figure.visible, figure.part_labels, figure.depth_order)
     assert same(again, annotation)
     with Image.open(folder / "part_labels.png") as image:

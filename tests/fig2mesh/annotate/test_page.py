@@ -53,9 +53,11 @@ def edit(url: str, *actions: dict[str, Any]) -> list[dict[str, Any]]:
 def read_back(files: DrawnFiles, tmp_path: Path) -> Any:
     saved = tmp_path / "saved"
     return read_figure(
-        files.image, mask=saved / "mask.png", keypoints=saved / "keypoints.json",
+        files.image,
+        mask=saved / "mask.png",
+        keypoints=saved / "keypoints.json",
         part_labels=saved / "part_labels.png",
-    )  # fmt: skip
+    )
 
 
 def test_a_joint_dragged_and_strokes_painted_are_read_by_the_main_job(
@@ -97,10 +99,17 @@ def test_undo_and_swap_and_keys(address: str, files: DrawnFiles) -> None:
     start = dict(zip(JOINT, given.joints_px.tolist(), strict=True))
     results = edit(
         address,
-        {"choose": ["#joint", "r_knee"]}, {"key": "ArrowLeft"}, {"key": "Shift+ArrowUp"}, {"key": "s"},
-        {"key": "Control+z"}, {"key": "Control+z"}, {"key": "2"}, {"key": " "}, {"key": "Control+z"},
+        {"choose": ["#joint", "r_knee"]},
+        {"key": "ArrowLeft"},
+        {"key": "Shift+ArrowUp"},
+        {"key": "s"},
+        {"key": "Control+z"},
+        {"key": "Control+z"},
+        {"key": "2"},
+        {"key": " "},
+        {"key": "Control+z"},
         {"key": "Control+Shift+z"},
-    )  # fmt: skip
+    )
     x, y = start["r_knee"]
     assert results[2]["joints"]["r_knee"][:2] == [x - 1, y - 10]
     assert results[3]["joints"]["l_knee"][:2] == [x - 1, y - 10]

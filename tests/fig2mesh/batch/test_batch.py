@@ -18,7 +18,7 @@ import pytest
 
 from exporters.validate import validate
 from fig2mesh.batch.ledger import WORK
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.benchmarks.batch import convert
 from tests.fig2mesh.batch.small import QUICK, events, manifest, tree, write_csv, write_pictures
 
@@ -88,14 +88,19 @@ def test_a_rerun_does_no_work(collection: Path, converted: Path, capsys: pytest.
     end = events(capsys.readouterr().out)[-1]
     assert (end["event"], end["stages"], end["counts"]) == ("end", {}, {})
     assert {k: end["progress"][k] for k in ("converted", "unchanged", "failed")} == {
-        "converted": 0, "unchanged": 4, "failed": 5,
-    }  # fmt: skip
+        "converted": 0,
+        "unchanged": 4,
+        "failed": 5,
+    }
     assert (tree(converted), (converted / "manifest.jsonl").read_bytes()) == before
 
 
 def test_what_a_killed_run_had_not_put_in_place_goes(collection: Path, converted: Path) -> None:
-    half = [converted / ".fig2mesh-1-abcd.tmp" / "half.json", converted / WORK / "stages" / "00" / ".ab.partial.npz",
-            converted / WORK / "records" / "00" / ".cd.partial"]  # fmt: skip
+    half = [
+        converted / ".fig2mesh-1-abcd.tmp" / "half.json",
+        converted / WORK / "stages" / "00" / ".ab.partial.npz",
+        converted / WORK / "records" / "00" / ".cd.partial",
+    ]
     for path in half:
         path.parent.mkdir(exist_ok=True)
         path.touch()
@@ -177,8 +182,20 @@ def test_files_of_others_and_a_second_batch_are_refused(
 
 
 def _command(collection: Path, out: Path) -> list[str]:
-    return [sys.executable, "-m", "fig2mesh", "batch", str(collection), "-o", str(out), "--jobs", "2",
-            "--progress", "json", "-q"]  # fmt: skip
+    return [
+        sys.executable,
+        "-m",
+        "fig2mesh",
+        "batch",
+        str(collection),
+        "-o",
+        str(out),
+        "--jobs",
+        "2",
+        "--progress",
+        "json",
+        "-q",
+    ]
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="no process groups")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.fig2mesh.batch.small import QUICK, tree, write_csv, write_pictures
 
 pytest.importorskip("distributed")
@@ -34,9 +34,19 @@ class Cluster:
     def worker(self) -> None:
         """One more worker, without a nanny: what is killed stays dead."""
         process = self._start(
-            "worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--memory-limit", "0",
-            "--name", f"w{len(self.processes)}", "--local-directory", str(self.folder),
-        )  # fmt: skip
+            "worker",
+            self.address,
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--no-dashboard",
+            "--memory-limit",
+            "0",
+            "--name",
+            f"w{len(self.processes)}",
+            "--local-directory",
+            str(self.folder),
+        )
         _wait_for(process, r"(Registered to)")
 
     def _start(self, *words: str) -> subprocess.Popen[str]:
@@ -92,8 +102,22 @@ def test_a_worker_is_killed_and_the_bytes_are_those_of_local_processes(
     collection: Path, cluster: Cluster, tmp_path: Path
 ) -> None:
     assert main(["batch", str(collection), "-o", str(tmp_path / "local"), "-q"]) == 2
-    command = [sys.executable, "-m", "fig2mesh", "batch", str(collection), "-o", str(tmp_path / "dask"), "-q",
-               "--engine", "dask", "--address", cluster.address, "--progress", "json"]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "fig2mesh",
+        "batch",
+        str(collection),
+        "-o",
+        str(tmp_path / "dask"),
+        "-q",
+        "--engine",
+        "dask",
+        "--address",
+        cluster.address,
+        "--progress",
+        "json",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
     killed, workers = False, set()

@@ -15,7 +15,7 @@ from fig2mesh.batch import row_job
 from fig2mesh.batch.ledger import DAMAGED, WORK, Ledger
 from fig2mesh.batch.row_job import check_row, convert_row
 from fig2mesh.batch.task import Batch, Outcome
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from tests.fig2mesh.batch.small import QUICK, batch_of, task_of, write_pictures
 
 WHOLE = ("figure", "lift", "parts", "body", "solid", "simplify", "surface", "model", "measures")

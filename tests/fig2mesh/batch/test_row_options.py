@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fig2mesh.batch.row_options import OURS, defaults_of, is_known, known_columns, options_of
-from fig2mesh.cli import make
+from fig2mesh.commands.main import make
 from fig2mesh.errors import InputError
 
 
@@ -82,8 +82,11 @@ def test_a_row_goes_before_the_defaults() -> None:
     defaults = {"quality": "fine", "map": "/sheet.tif", "effect": ("none",), "seed": 3}
     bare = options_of({"figure": "a", "x": 1, "y": 2}, defaults, "n").values
     assert (bare["quality"], bare["map_sheet"], bare["effects"], bare["at"]) == (
-        "fine", Path("/sheet.tif"), ("none",), (1.0, 2.0),
-    )  # fmt: skip
+        "fine",
+        Path("/sheet.tif"),
+        ("none",),
+        (1.0, 2.0),
+    )
     own = options_of({"figure": "a", "lon": 1, "lat": 2, "quality": "draft", "effect": "light"}, defaults, "n").values
     assert (own["quality"], own["map_sheet"], own["effects"], own["seed"]) == ("draft", None, ("light",), 3)
     other = options_of({"figure": "a", "map": "other.tif"}, {"lonlat": (1.0, 2.0)}, "n").values

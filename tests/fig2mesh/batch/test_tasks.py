@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fig2mesh.batch.rows import Row
+from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.tasks import LONGEST_NAME, TAKEN, read_spool, tasks_of, write_spool
 
 

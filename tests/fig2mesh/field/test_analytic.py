@@ -5,8 +5,8 @@ import pytest
 
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
-from fig2mesh.paper import FIGURE_HEIGHT
 from fig2mesh.records import PART_NAMES
+from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 
 def hull_of_balls(start, end, first, second, points, steps=4001):

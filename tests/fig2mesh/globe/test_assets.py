@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from exporters.czml import write_czml
-from exporters.glb import write_glb, write_gltf
-from exporters.tiles import write_tileset
+from exporters.gis.czml import write_czml
+from exporters.gltf.glb import write_glb, write_gltf
+from exporters.tiles.tileset import write_tileset
 from fig2mesh.errors import InputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
@@ -70,8 +70,11 @@ def test_tilesets_in_tilesets_are_followed(tmp_path: Path, figure: Path) -> None
     found = find_assets((tmp_path,))
     addresses = page_files(found)
     assert set(addresses) == {
-        "assets/0/tileset.json", "assets/0/deep/one more.json", "assets/0/deep/a.glb", "assets/0/farmer.glb"
-    }  # fmt: skip
+        "assets/0/tileset.json",
+        "assets/0/deep/one more.json",
+        "assets/0/deep/a.glb",
+        "assets/0/farmer.glb",
+    }
     assert all(path.is_file() for path in addresses.values())
 
 
@@ -86,8 +89,10 @@ def test_czml_brings_its_models_and_folders_their_files(tmp_path: Path, figure: 
     write_json(tmp_path / "index.geojson", {"type": "FeatureCollection", "features": []})
     found = find_assets((tmp_path,))
     assert {each.kind: each.files for each in found} == {
-        "model": ("farmer.glb",), "geojson": ("index.geojson",), "czml": ("farmer.czml", "farmer.glb"),
-    }  # fmt: skip
+        "model": ("farmer.glb",),
+        "geojson": ("index.geojson",),
+        "czml": ("farmer.czml", "farmer.glb"),
+    }
 
 
 CASES = [

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from exporters.asset import Asset
-from exporters.czml import write_czml
-from exporters.glb import glb_bytes, write_gltf
-from exporters.tiles import write_tileset
+from exporters.gis.czml import write_czml
+from exporters.gltf.glb import glb_bytes, write_gltf
+from exporters.tiles.tileset import write_tileset
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
 from fig2mesh.view.server import page_server
@@ -197,20 +197,22 @@ def test_observed_or_inferred_is_shown_by_texels_where_a_file_has_them(
 ) -> None:
     (tmp_path / "fine.glb").write_bytes(glb_bytes(asset(ZURICH)))
     actions = [
-        {"evaluate": BARE}, {"evaluate": LOOK.format(index=0)},
-        {"evaluate": "fig2mesh.setMode(true)"}, {"screenshot": True},
+        {"evaluate": BARE},
+        {"evaluate": LOOK.format(index=0)},
+        {"evaluate": "fig2mesh.setMode(true)"},
+        {"screenshot": True},
         {"evaluate": "(fig2mesh.viewer.camera.rotateLeft(Math.PI), fig2mesh.viewer.scene.requestRender())"},
-        {"screenshot": True}, {"evaluate": "document.getElementById('grain').textContent"},
-        {"key": "o"}, {"screenshot": True},
-    ]  # fmt: skip
+        {"screenshot": True},
+        {"evaluate": "document.getElementById('grain').textContent"},
+        {"key": "o"},
+        {"screenshot": True},
+    ]
     assets = find_assets((tmp_path / "fine.glb",))
     with serving(page_server(globe_page(assets), 0, {"cesium": cesium}, page_files(assets))) as address:
         found = look(address, *actions, size=(SIZE, SIZE))
     assert found["messages"] == []
     assert found["results"][6]["value"] == "for each point of the surface"
-    front, back, drawn = (
-        pixels(found["results"][i]["png"])[SIZE // 2, SIZE // 2, :3].astype(int) for i in (3, 5, 8)
-    )  # fmt: skip
+    front, back, drawn = (pixels(found["results"][i]["png"])[SIZE // 2, SIZE // 2, :3].astype(int) for i in (3, 5, 8))
     assert front[2] > front[0] + 60, "what the drawing showed is blue"
     assert back[0] > back[2] + 60, "what it did not is orange"
     assert abs(int(drawn[2]) - 128) < 8, "the drawing's own colour again"

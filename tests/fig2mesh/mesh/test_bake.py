@@ -7,11 +7,11 @@ import pytest
 
 from fig2mesh.field.analytic import sample, sphere
 from fig2mesh.field.body import Body
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.bake import Baked, bake, rasterise
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.mesh.unwrap import unwrap
-from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import UvMesh
 from fig2mesh.texture.sources import Sources
 

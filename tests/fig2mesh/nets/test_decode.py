@@ -8,7 +8,7 @@ from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.nets.decode import decode, decode_counted, decode_dense, decode_many
 from fig2mesh.nets.disn import Disn, DisnShape, as_input
-from fig2mesh.parts.kinds import ANCHORS
+from fig2mesh.skeleton import ANCHORS
 
 from .test_disn import disc, made
 

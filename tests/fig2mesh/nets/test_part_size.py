@@ -9,10 +9,10 @@ import pytest
 import torch
 
 from fig2mesh.nets.part_size import PartSizeNet, SizeShape, part_size, read_size, save_size, size_path
-from fig2mesh.parts.kinds import JOINT_MIRROR, KINDS, part_centre
 from fig2mesh.records import PART, PART_NAMES
-from fig2mesh.training.loop import seeded
-from fig2mesh.training.train_size import mask_extent, read_sizes, train_size
+from fig2mesh.skeleton import JOINT_MIRROR, KINDS, part_centre
+from fig2mesh.training.networks.loop import seeded
+from fig2mesh.training.networks.train_size import mask_extent, read_sizes, train_size
 
 
 def joints(seed: int = 0) -> np.ndarray:
@@ -41,9 +41,14 @@ def write_shards(folder: Path, bodies: int = 24) -> None:
         hidden = filled.copy()
         hidden[:, 1:] = False
         np.savez(
-            folder / f"{split}-00000.npz", joints=placed, centre=centre, size=size, edge=edge,
-            mask_amodal=np.packbits(filled, axis=-1), mask_visible=np.packbits(hidden, axis=-1),
-        )  # fmt: skip
+            folder / f"{split}-00000.npz",
+            joints=placed,
+            centre=centre,
+            size=size,
+            edge=edge,
+            mask_amodal=np.packbits(filled, axis=-1),
+            mask_visible=np.packbits(hidden, axis=-1),
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)

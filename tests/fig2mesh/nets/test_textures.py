@@ -16,7 +16,7 @@ from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, read
 from fig2mesh.nets.uv_unet import PARTS, UvUnet, UvUnetShape, infer_uv, read_uv, save_uv, uv_inputs
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine, read_refine, refine, save_refine
 from fig2mesh.records import PART
-from fig2mesh.training.loop import seeded
+from fig2mesh.training.networks.loop import seeded
 
 
 def test_a_picture_comes_out_as_large_as_it_went_in() -> None:
@@ -86,8 +86,9 @@ def test_colours_survive_the_disc() -> None:
     for colour, (x, y, value) in zip(COLOURS[0].reshape(3, -1).T.tolist()[:200], found[:200], strict=True):
         hue, saturation, brightness = colorsys.rgb_to_hsv(*colour)
         angle = 2 * np.pi * hue
-        np.testing.assert_allclose((x, y, value), (saturation * np.cos(angle), saturation * np.sin(angle), brightness),
-                                   atol=1e-5)  # fmt: skip
+        np.testing.assert_allclose(
+            (x, y, value), (saturation * np.cos(angle), saturation * np.sin(angle), brightness), atol=1e-5
+        )
 
 
 def test_greys_have_no_hue() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parse.sheet import STEP, _centres, _edges, _shared
 from fig2mesh.records import JOINT

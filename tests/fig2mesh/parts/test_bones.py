@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fig2mesh.parse.frame import image_frame
+from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.bones import AT_HEM, HANGING, STEEPEST, Bones, core_bones, hem_depth, out_of_cloth, slopes2
 from fig2mesh.parts.canvas import Canvas, make_canvas
 from fig2mesh.parts.depth import mid_surface

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from fig2mesh.field.body import Body
-from fig2mesh.parse.frame import image_frame
+from fig2mesh.image_frame import image_frame
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import Outline, outline_parts

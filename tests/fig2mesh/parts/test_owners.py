@@ -32,9 +32,17 @@ def bar(start: tuple[float, float], end: tuple[float, float], radius: float, *, 
     part = np.repeat(np.array([PART["l_upper_arm"], PART["l_lower_arm"], PART["l_hand"]], np.uint8), count // 3)
     radii, both = np.full(count, radius), np.ones((count, 2), bool)
     return Limb(
-        "l_arm", points, np.zeros(count), radii, radii, part, both, both, np.full((count, 2), radius),
+        "l_arm",
+        points,
+        np.zeros(count),
+        radii,
+        radii,
+        part,
+        both,
+        both,
+        np.full((count, 2), radius),
         np.full(count, seen),
-    )  # fmt: skip
+    )
 
 
 def disc(x: float, y: float, radius: float) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fig2mesh.measure_solid import inner_shells
+from fig2mesh.measure.solid import inner_shells
 from fig2mesh.mesh.topology import check_solid
 from fig2mesh.parts.props import find_props, prop_depth
 from fig2mesh.records import JOINT, PART

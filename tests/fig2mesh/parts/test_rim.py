@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fig2mesh.parse.frame import image_frame
+from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.canvas import Canvas, make_canvas, raster_distance
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.rim import LEAST_SLOPE, OVERLAP, RIM_BLUR, extended, rim_distance

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fig2mesh.parse.frame import image_frame
-from fig2mesh.parts.kinds import JOINT_MIRROR
+from fig2mesh.image_frame import image_frame
 from fig2mesh.pose.network import lift_by_network, upright
 from fig2mesh.records import JOINT, JOINT_NAMES, Figure
+from fig2mesh.skeleton import JOINT_MIRROR
 from tests.drawn import JOINTS, draw_figure
 
 

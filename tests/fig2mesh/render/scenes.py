@@ -7,9 +7,9 @@ import numpy as np
 from exporters.asset import TexturedMesh
 from fig2mesh.field.analytic import Distance, mannequin, sample, sphere
 from fig2mesh.field.body import Body
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import PART
 from fig2mesh.render.scene import FieldScene
 from fig2mesh.texture.sources import Sources
@@ -30,10 +30,12 @@ def ball(radius: float = 0.5) -> FieldScene:
 
 def balls() -> Body:
     """A torso below and a head above, which overlap."""
-    return Body((
-        sample(sphere((0, 0, 0), 0.5), TORSO, (0, 0, 0), 1.2, 64),
-        sample(sphere((0, 0.6, 0.1), 0.3), HEAD, (0, 0.6, 0.1), 0.72, 48),
-    ))  # fmt: skip
+    return Body(
+        (
+            sample(sphere((0, 0, 0), 0.5), TORSO, (0, 0, 0), 1.2, 64),
+            sample(sphere((0, 0.6, 0.1), 0.3), HEAD, (0, 0.6, 0.1), 0.72, 48),
+        )
+    )
 
 
 def balls_scene() -> FieldScene:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exporters.errors import ExportError
-from exporters.part_borders import split_at_parts
+from exporters.gltf.part_borders import split_at_parts
 from exporters.profiles import PROFILES, profile_named
 from exporters.write import write
 from fig2mesh.render.model import read_model

@@ -314,10 +314,12 @@ def test_smooth_union_does_not_swell_limbs_that_share_a_surface() -> None:
     """One ball cut in two halves that overlap: a plain smooth minimum would leave a ring around it."""
     whole = ball(0.4).body.parts[0]
     y = np.linspace(-whole.edge / 2, whole.edge / 2, whole.grid.shape[0], dtype=np.float32)[None, :, None]
-    halves = Body((
-        replace(whole, grid=np.maximum(whole.grid, y - 0.05)),
-        replace(whole, part=HEAD, grid=np.maximum(whole.grid, -0.05 - y)),
-    ))  # fmt: skip
+    halves = Body(
+        (
+            replace(whole, grid=np.maximum(whole.grid, y - 0.05)),
+            replace(whole, part=HEAD, grid=np.maximum(whole.grid, -0.05 - y)),
+        )
+    )
     assert not smooth_union(halves).fillets
 
 

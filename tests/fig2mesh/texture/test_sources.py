@@ -9,7 +9,7 @@ import pytest
 from PIL import ImageDraw
 from scipy import ndimage
 
-from fig2mesh.parse.frame import image_frame
+from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import outline_parts
 from fig2mesh.pose.prior import lift

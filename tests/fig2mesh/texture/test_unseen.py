@@ -11,11 +11,11 @@ import torch
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
+from fig2mesh.image_frame import ImageFrame
 from fig2mesh.nets.head_hsv import HeadHsv, HeadShape
 from fig2mesh.nets.texture_fill import FillShape, TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
-from fig2mesh.parse.frame import ImageFrame
 from fig2mesh.records import JOINT, JOINT_NAMES, PART, Pose3D
 from fig2mesh.texture.sides import FILLED, Sides, body_labels, look_around
 from fig2mesh.texture.unseen import (
@@ -26,7 +26,7 @@ from fig2mesh.texture.unseen import (
     unseen_changes,
     unseen_sides,
 )
-from fig2mesh.training.loop import seeded
+from fig2mesh.training.networks.loop import seeded
 
 SIZE = 64
 POSE = Pose3D(np.zeros((len(JOINT_NAMES), 3), np.float32))

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
+from fig2mesh.commands.tradeoff import KNOBS as NAMES
 from fig2mesh.settings import PRESETS, Settings
 from fig2mesh.tradeoff import sweep
 from fig2mesh.tradeoff.report import COLUMNS
 from fig2mesh.tradeoff.sweep import FINEST, KNOBS, STAGES_OF, requests
-from fig2mesh.tradeoff_cli import KNOBS as NAMES
 from tests.drawn import DrawnFiles, write_figure
 
 CHEAP = replace(PRESETS["draft"], parts="outline", textures="plain", mesher="isosurface", voxel=0.02, texture_size=128)

@@ -6,9 +6,9 @@ import numpy as np
 
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.records import PART
-from fig2mesh.training.drawing import Layers
-from fig2mesh.training.faces import Face
-from fig2mesh.training.raster import rasterise
+from fig2mesh.training.drawing.draw import Layers
+from fig2mesh.training.drawing.faces import Face
+from fig2mesh.training.drawing.raster import rasterise
 
 MATERIALS = ("skin", "hair", "cloth.shirt", "cloth.trousers", "shoe", "eye")
 HEIGHT = 1.79
@@ -82,8 +82,14 @@ def body(rng: np.random.Generator, shirt_sleeve: bool = True) -> dict[str, np.nd
     for corner in range(3):
         np.add.at(normals, f[:, corner], np.cross(v[f[:, 1]] - v[f[:, 0]], v[f[:, 2]] - v[f[:, 0]]))
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return {"vertices": v, "faces": f, "normals": normals, "uv": np.concatenate(uvs),
-            "face_part": np.concatenate(part), "face_material": np.concatenate(material)}  # fmt: skip
+    return {
+        "vertices": v,
+        "faces": f,
+        "normals": normals,
+        "uv": np.concatenate(uvs),
+        "face_part": np.concatenate(part),
+        "face_material": np.concatenate(material),
+    }
 
 
 def look(model: dict[str, np.ndarray], view: str = "front", size: int = 256) -> tuple[Layers, Face | None]:
@@ -94,8 +100,13 @@ def look(model: dict[str, np.ndarray], view: str = "front", size: int = 256) -> 
     seen = rasterise(vertices, faces, size=size, low=low, pitch=pitch)
     normals = seen.blend(model["normals"] @ turn.T, faces)
     normals = np.where(normals[..., 2:] < 0, -normals, normals)
-    layers = Layers(seen.pick(model["face_part"]), seen.pick(model["face_material"], -1),
-                    seen.blend(model["uv"], faces), seen.depth, normals)  # fmt: skip
+    layers = Layers(
+        seen.pick(model["face_part"]),
+        seen.pick(model["face_material"], -1),
+        seen.blend(model["uv"], faces),
+        seen.depth,
+        normals,
+    )
     marks = np.array([[0.04, 0.735, 0.11], [-0.04, 0.735, 0.11], [0, 0.66, 0.1]]) @ turn.T
     pixels = np.stack([(marks[:, 0] - low[0]) / pitch, size - (marks[:, 1] - low[1]) / pitch], axis=1)
     if view == "back":

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.field.camera import axes
 from fig2mesh.records import JOINT, JOINT_NAMES, PART
-from fig2mesh.training.texture_data import Drawings
+from fig2mesh.training.samples.texture_data import Drawings
 
 SIZE = 64
 QUARTERS = (("head", "torso"), ("l_foot", "r_foot"))
@@ -60,9 +60,13 @@ def write_shards(folder: Path, count: int = 12) -> None:
     for number, split in enumerate(("train", "valid-clips", "valid-characters")):
         made = drawings(count if split == "train" else 3, number)
         np.savez(
-            folder / f"{split}-00000.npz", picture=made.picture, labels=made.labels, depth=made.depth, uv=made.uv,
+            folder / f"{split}-00000.npz",
+            picture=made.picture,
+            labels=made.labels,
+            depth=made.depth,
+            uv=made.uv,
             joints=np.stack([joints() for _ in range(len(made))]),
-        )  # fmt: skip
+        )
 
 
 def joints() -> NDArray[np.float32]:

@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.records import JOINT_NAMES, PART
-from fig2mesh.training.anny_body import AnnyBodies, face_parts, rest_directions
-from fig2mesh.training.garments import Garment
-from fig2mesh.training.pack import Character, Pack
-from fig2mesh.training.rig import KEY_PARENT, KEYS, PoseSet, Rig
-from fig2mesh.training.stances import stances
+from fig2mesh.training.bodies.anny_body import AnnyBodies, face_parts, rest_directions
+from fig2mesh.training.bodies.garments import Garment
+from fig2mesh.training.bodies.pack import Character, Pack
+from fig2mesh.training.bodies.rig import KEY_PARENT, KEYS, PoseSet, Rig
+from fig2mesh.training.bodies.stances import stances
 
 HEIGHT = 1.79
 PITCH = 0.035
 SHOULDER = np.array([0.18, 1.40, 0.0])
 
+# fmt: off
 BONES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
     "hips": ((0, 0.95, 0), (0, 1.05, 0), 0.16), "spine1": ((0, 1.05, 0), (0, 1.15, 0), 0.15),
     "spine2": ((0, 1.15, 0), (0, 1.25, 0), 0.15), "spine3": ((0, 1.25, 0), (0, 1.36, 0), 0.16),
@@ -29,17 +30,20 @@ BONES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], f
     "lower_arm": ((0.45, 1.40, 0), (0.70, 1.40, 0), 0.058), "hand": ((0.70, 1.40, 0), (0.77, 1.40, 0), 0.055),
     "finger": ((0.78, 1.40, 0), (0.85, 1.40, 0), 0.05), "upper_leg": ((0.14, 0.88, 0), (0.145, 0.50, 0), 0.085),
     "lower_leg": ((0.145, 0.50, 0), (0.15, 0.08, 0), 0.07), "foot": ((0.15, 0.075, 0), (0.16, 0.06, 0.15), 0.06),
-}  # fmt: skip
+}
+# fmt: on
 """Left or middle bone → where it starts and ends, and the radius of its capsule; "finger" hangs on the hand."""
 
 NAMES = (*KEYS, "l_finger", "r_finger")
+# fmt: off
 PLACES = {
     "head": ("head", (0, 1.65, 0.01)), "eyes": ("head", (0, 1.67, 0.11)), "neck": ("neck", (0, 1.52, 0)),
     "thorax": ("spine3", (0, 1.36, 0)), "pelvis": ("hips", (0, 0.95, 0)), "shoulder": ("upper_arm", SHOULDER),
     "elbow": ("lower_arm", (0.45, 1.40, 0)), "wrist": ("hand", (0.70, 1.40, 0)), "hand": ("hand", (0.78, 1.40, 0)),
     "hip": ("upper_leg", (0.14, 0.88, 0)), "knee": ("lower_leg", (0.145, 0.50, 0)), "ankle": ("foot", (0.15, 0.08, 0)),
     "foot": ("foot", (0.16, 0.06, 0.12)),
-}  # fmt: skip
+}
+# fmt: on
 """Left or middle joint → bone and place."""
 
 
@@ -83,8 +87,10 @@ def capsule_man(name: str = "man", drop_deg: float = 0.0, materials: tuple[str, 
     field = capsule_distances(nodes, drop).min(axis=1).reshape(counts)
     vertices, faces, _, _ = marching_cubes(field, 0.0, gradient_direction="descent")
     vertices = low + PITCH * vertices
-    parents = np.array([NAMES.index(KEY_PARENT[n]) if n in KEY_PARENT else -1 for n in KEYS] + [
-        NAMES.index("l_hand"), NAMES.index("r_hand")])  # fmt: skip
+    parents = np.array(
+        [NAMES.index(KEY_PARENT[n]) if n in KEY_PARENT else -1 for n in KEYS]
+        + [NAMES.index("l_hand"), NAMES.index("r_hand")]
+    )
     heads = np.array([_placed(n, BONES[_side(n)[0]][0], drop) for n in NAMES])
     near = capsule_distances(vertices, drop)
     # Of two capsules that reach a joint, the nearer one counts most; away from joints one bone has it all.
@@ -100,14 +106,22 @@ def capsule_man(name: str = "man", drop_deg: float = 0.0, materials: tuple[str, 
     joints = [(n, *PLACES[_side(n)[0]]) for n in JOINT_NAMES]
     index = order.astype(np.int32)
     return Rig(
-        name=name, vertices=vertices, faces=faces,
+        name=name,
+        vertices=vertices,
+        faces=faces,
         face_part=face_parts(faces, index, weight, parents, key_bone),
-        face_material=(vertices[faces][:, :, 1].mean(axis=1) < 1.3) % len(materials), materials=materials,
-        bone_index=index, bone_weight=weight, parents=parents, heads=heads, key_bone=key_bone,
-        rest_direction=rest_directions(heads, key_bone), finger_axis=axis.astype(np.float32),
+        face_material=(vertices[faces][:, :, 1].mean(axis=1) < 1.3) % len(materials),
+        materials=materials,
+        bone_index=index,
+        bone_weight=weight,
+        parents=parents,
+        heads=heads,
+        key_bone=key_bone,
+        rest_direction=rest_directions(heads, key_bone),
+        finger_axis=axis.astype(np.float32),
         joint_bone=np.array([NAMES.index(n[:2] + bone if n[:2] in ("l_", "r_") else bone) for n, bone, _ in joints]),
         joint_rest=np.array([_placed(n, x, drop, bone) for n, bone, x in joints]),
-    )  # fmt: skip
+    )
 
 
 @cache
@@ -127,9 +141,9 @@ def bodies() -> AnnyBodies:
     def moved(points: NDArray[np.floating]) -> NDArray[np.float32]:
         """(2, N, 3): both shapes are linear in the place, so bones, joints and skin stay together."""
         zero = 0.0 * points[:, 0]
-        return np.stack([
-            np.stack([0.06 * points[:, 0], zero, zero], 1), np.stack([zero, 0.03 * points[:, 1], zero], 1)
-        ]).astype(np.float32)  # fmt: skip
+        return np.stack(
+            [np.stack([0.06 * points[:, 0], zero, zero], 1), np.stack([zero, 0.03 * points[:, 1], zero], 1)]
+        ).astype(np.float32)
 
     corner = rig.vertices[rig.faces]
     return AnnyBodies(

@@ -7,15 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from fig2mesh.field.camera import axes
-from fig2mesh.parts.kinds import KINDS, PART_KIND, anchor_joints, part_centre
 from fig2mesh.records import BODY_PARTS, JOINT_NAMES
+from fig2mesh.skeleton import KINDS, PART_KIND, anchor_joints, part_centre
 
 RADIUS = dict(zip(KINDS, (0.18, 0.11, 0.05, 0.04, 0.04, 0.07, 0.055, 0.045), strict=True))
+# fmt: off
 STANDING = {
     "head": (0, 0.75, 0), "eyes": (0, 0.75, 0.1), "neck": (0, 0.58, 0), "thorax": (0, 0.5, 0), "pelvis": (0, 0, 0),
     "shoulder": (0.2, 0.5, 0), "elbow": (0.45, 0.35, -0.05), "wrist": (0.65, 0.2, 0.05), "hand": (0.75, 0.15, 0.08),
     "hip": (0.1, -0.05, 0), "knee": (0.14, -0.45, 0.06), "ankle": (0.13, -0.85, 0), "foot": (0.15, -0.9, 0.15),
-}  # fmt: skip
+}
+# fmt: on
 
 
 def joints(rng: np.random.Generator, bodies: int) -> np.ndarray:
@@ -82,12 +84,18 @@ def write_shard(path: Path, bodies: int = 2, seed: int = 0, *, grids: bool = Fal
                 grid[body, part] = field(label, local, nodes, scale)
     packed = np.packbits(masks, axis=-1)
     arrays = {
-        "joints": skeletons.astype(np.float32), "centre": centre.astype(np.float32), "edge": edge.astype(np.float32),
-        "size": np.zeros((*shape, 3), np.float32), "points": points.astype(np.float16),
-        "distance": distance.astype(np.float16), "mask_amodal": packed, "mask_visible": packed,
-        "character": np.array(["stick"] * bodies), "clip": np.array(["standing"] * bodies),
+        "joints": skeletons.astype(np.float32),
+        "centre": centre.astype(np.float32),
+        "edge": edge.astype(np.float32),
+        "size": np.zeros((*shape, 3), np.float32),
+        "points": points.astype(np.float16),
+        "distance": distance.astype(np.float16),
+        "mask_amodal": packed,
+        "mask_visible": packed,
+        "character": np.array(["stick"] * bodies),
+        "clip": np.array(["standing"] * bodies),
         "seed": np.arange(bodies),
-    }  # fmt: skip
+    }
     if grid is not None:
         arrays["grid"] = grid
     path.parent.mkdir(parents=True, exist_ok=True)

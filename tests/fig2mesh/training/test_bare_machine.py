@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fig2mesh.training.pack import save_pack
+from fig2mesh.training.bodies.pack import save_pack
 from tests.fig2mesh.training.figures import capsule_pack
 
 SCRIPT = """
@@ -25,8 +25,8 @@ sys.meta_path.insert(0, Bare())
 from pathlib import Path
 import numpy as np
 from fig2mesh.nets.disn import DisnShape
-from fig2mesh.training.build import build
-from fig2mesh.training.train_parts import train_parts
+from fig2mesh.training.samples.build import build
+from fig2mesh.training.networks.train_parts import train_parts
 
 folder = Path(sys.argv[1])
 build(folder / "pack.npz", folder / "data", bodies=1, valid=0)

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from skimage.metrics import structural_similarity
 
-from fig2mesh.cli import main
+from fig2mesh.commands.main import main
 from fig2mesh.view.page import EFFECTS
 from tests.browser import Look, pixels
 from tests.drawn import write_figure
@@ -18,10 +18,12 @@ from tests.fig2mesh.view.reference import picture
 
 PLAIN = ("texture", "light", "smooth-union")
 RICH = ("texture", "blend", "creases", "light", "ao", "smooth-union")
+# fmt: off
 VIEWS = (
     (0.0, 0.0, PLAIN), (40.0, 10.0, PLAIN), (0.0, 0.0, RICH), (-40.0, 15.0, RICH), (180.0, 0.0, RICH),
     (65.0, -20.0, ("texture", "perspective")), (90.0, 70.0, ("texture",)),
-)  # fmt: skip
+)
+# fmt: on
 
 
 def test_pictures_are_those_of_the_compiled_tracer(painted: Painted, page: Path, look: Look) -> None:

@@ -1,0 +1,1 @@
+"""Indexes and catalogues for GIS clients: CZML, GeoJSON, GeoPackage and STAC, with their checks and facts."""

@@ -1,0 +1,1 @@
+"""glTF 2.0: writing, reading, checking and inspecting GLB and glTF files."""

@@ -1,0 +1,249 @@
+"""Checks of glTF files: structure and our own promises in Python, the full rules by the Khronos validator.
+
+Files from elsewhere promise less: what glTF does not demand of them (a closed solid, textures that do not repeat) is
+worth an info, not an error.
+
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exporters.errors import DAMAGE, ExportError
+from exporters.findings import Finding, as_infos, check_place, check_solid
+from exporters.gltf.khronos import khronos_findings
+from exporters.gltf.ktx2 import size_of
+from exporters.gltf.reader import MESHOPT, Gltf, NotReadHere, read_gltf
+from exporters.texture_files import MAX_TEXTURE_PX, TooLarge, check_texture
+
+UNIT_TOLERANCE = 5e-4
+"""How far a normal's length may be from 1; the Khronos validator allows about as much."""
+
+BYTE_UNIT_TOLERANCE = 2e-2
+"""The same for normals of 8 bits: half a step of each of three components."""
+
+NOT_HERE = "NOT_READ_HERE"
+"""Code of the infos about what is not decoded here."""
+
+MAX_TEXTURES = 4
+"""Textures of the largest size whose pixels one file may have decoded: images may name the same bytes."""
+
+# fmt: off
+CODECS = {
+    *MESHOPT, "KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_basisu", "KHR_texture_transform",
+    "EXT_texture_webp", "EXT_texture_avif",
+}
+# fmt: on
+"""Extensions that a file has to require, as its data cannot be read without them; common clients know them."""
+
+
+def check_gltf(path: Path, external: bool = True) -> list[Finding]:
+    """Findings about a .glb or .gltf file.
+
+    external : run the Khronos validator too where it is found, see `exporters.gltf.khronos`
+    """
+    try:
+        gltf = read_gltf(path)
+    except ExportError as error:
+        return [Finding("error", "UNREADABLE", error.finding, path.name)]
+    ours = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
+    findings = list(_check_document(gltf, ours))
+    for index, mesh in enumerate(gltf.items("meshes")):
+        where = f"{path.name}: meshes/{index}"
+        try:
+            for number, primitive in enumerate(mesh["primitives"]):
+                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", ours)
+            findings += _check_manifold(gltf, index, where)
+            solid = check_solid(*gltf.solid_arrays(index), where)
+            findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
+        except NotReadHere as reason:
+            findings.append(Finding("info", NOT_HERE, str(reason), where))
+        except DAMAGE as error:
+            findings.append(Finding("error", "UNREADABLE_MESH", str(error), where))
+    if not external:
+        return findings
+    images = enumerate(gltf.items("images"))
+    ktx2 = frozenset(f"/images/{index}" for index, image in images if image.get("mimeType") == "image/ktx2")
+    return findings + khronos_findings(path, ktx2)
+
+
+def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
+    name = gltf.path.name
+    about = gltf.document.get("asset", {})
+    if about.get("version") != "2.0":
+        yield Finding("error", "VERSION", f"asset.version is {about.get('version')}, expected 2.0", f"{name}: asset")
+    if not gltf.items("meshes"):
+        yield Finding("error" if ours else "info", "NO_MESH", "no mesh", name)
+    used = gltf.document.get("extensionsUsed", [])
+    for extension in gltf.document.get("extensionsRequired", []):
+        message = f"{extension}: viewers without it refuse the file"
+        yield Finding("info" if extension in CODECS else "warning", "EXTENSION_REQUIRED", message, name)
+        if extension not in used:
+            yield Finding("error", "EXTENSION_USED", f"{extension} is required but not among those used", name)
+    place = about.get("extras", {}).get("georeference") if isinstance(about.get("extras"), dict) else None
+    if ours and place is not None:
+        yield from check_place(place, f"{name}: asset.extras.georeference")
+    for index in range(len(gltf.items("accessors"))):
+        yield from _check_accessor(gltf, index, f"{name}: accessors/{index}")
+    pixels = 0
+    for index in range(len(gltf.items("images"))):
+        if pixels > MAX_TEXTURES * MAX_TEXTURE_PX:
+            yield Finding("info", NOT_HERE, f"images/{index} and all after it: more pixels than are looked into", name)
+            break
+        pixels += yield from _check_image(gltf, index, f"{name}: images/{index}")
+    yield from _check_property_tables(gltf)
+    yield from _check_property_textures(gltf)
+
+
+def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
+    accessor = gltf.items("accessors")[index]
+    try:
+        values = gltf.accessor(index)
+    except NotReadHere as reason:
+        yield Finding("info", NOT_HERE, str(reason), where)
+        return
+    except DAMAGE as error:
+        yield Finding("error", "ACCESSOR", str(error), where)
+        return
+    if values.dtype.kind == "f" and not np.isfinite(values).all():
+        yield Finding("error", "NOT_FINITE", "NaN or infinite values", where)
+        return
+    if "bufferView" not in accessor and "sparse" not in accessor:
+        return  # zeros, or in the hands of an extension
+    for key, measured in (("min", values.min(axis=0)), ("max", values.max(axis=0))):
+        if key in accessor and not np.array_equal(np.asarray(accessor[key], values.dtype), np.atleast_1d(measured)):
+            yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, values say {measured.tolist()}", where)
+
+
+def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None, int]:
+    """Findings about an image; returns how many pixels had to be decoded."""
+    try:
+        data = gltf.image(index)
+        if gltf.items("images")[index].get("mimeType") == "image/ktx2":
+            size_of(data)
+            return 0
+        return check_texture(data)
+    except (NotReadHere, TooLarge) as reason:
+        yield Finding("info", NOT_HERE, str(reason), where)
+    except DAMAGE as error:
+        yield Finding("error", "IMAGE", str(error), where)
+    return 0
+
+
+def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bool) -> Iterator[Finding]:
+    attributes = primitive["attributes"]
+    if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
+        raise NotReadHere("compressed with Draco")
+    if "POSITION" not in attributes:
+        yield Finding("error" if ours else "info", "NO_POSITION", "no positions: nothing is drawn", where)
+        return
+    count = len(gltf.accessor(attributes["POSITION"]))
+    if "min" not in gltf.items("accessors")[attributes["POSITION"]]:
+        yield Finding("error", "MIN_MAX", "POSITION without min and max", where)
+    for attribute, accessor in attributes.items():
+        length = len(gltf.accessor(accessor))
+        if length != count:
+            yield Finding("error", "ATTRIBUTE_COUNT", f"{attribute} has {length} of {count} vertices", where)
+    mode = primitive.get("mode", 4)
+    indices = gltf.accessor(primitive["indices"]) if "indices" in primitive else np.arange(count)
+    if mode == 4 and len(indices) % 3:
+        yield Finding("error", "NOT_TRIANGLES", f"mode {mode}, {len(indices)} indices", where)
+    elif mode != 4:
+        yield Finding("error" if ours else "info", "NOT_TRIANGLES", f"mode {mode}: no list of triangles", where)
+    if indices.max() >= count:
+        # Everything after this would read beyond the vertices.
+        raise ValueError(f"index {int(indices.max())} of {count} vertices")
+    if "NORMAL" in attributes:
+        length = np.linalg.norm(gltf.numbers(attributes["NORMAL"]).astype(np.float64), axis=1)
+        worst = float(np.abs(length - 1).max())
+        if worst > (BYTE_UNIT_TOLERANCE if gltf.accessor(attributes["NORMAL"]).itemsize == 1 else UNIT_TOLERANCE):
+            yield Finding("error", "NORMAL_LENGTH", f"normals are up to {worst:.2g} off unit length", where)
+    if "TEXCOORD_0" in attributes and ours:
+        uv = gltf.numbers(attributes["TEXCOORD_0"])
+        if uv.dtype.kind == "f" and (uv.min() < 0 or uv.max() > 1):
+            yield Finding("warning", "TEXCOORD_RANGE", "texture coordinates outside [0, 1]", where)
+    yield from _check_features(gltf, primitive, where)
+
+
+def _check_features(gltf: Gltf, primitive: dict[str, Any], where: str) -> Iterator[Finding]:
+    extension = primitive.get("extensions", {}).get("EXT_mesh_features", {})
+    for feature in extension.get("featureIds", []):
+        if "attribute" not in feature:
+            continue
+        ids = gltf.accessor(primitive["attributes"][f"_FEATURE_ID_{feature['attribute']}"])
+        if ids.min() < 0 or ids.max() >= feature["featureCount"] or (ids != np.rint(ids)).any():
+            yield Finding("error", "FEATURE_ID", f"feature ids outside 0..{feature['featureCount'] - 1}", where)
+        table = feature.get("propertyTable")
+        metadata = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {})
+        if table is not None and table >= len(metadata.get("propertyTables", [])):
+            yield Finding("error", "PROPERTY_TABLE", f"there is no property table {table}", where)
+
+
+def _check_property_tables(gltf: Gltf) -> Iterator[Finding]:
+    metadata = gltf.document.get("extensions", {}).get("EXT_structural_metadata")
+    if metadata is None:
+        return
+    where = f"{gltf.path.name}: EXT_structural_metadata"
+    if "id" not in metadata.get("schema", {}):
+        yield Finding("error", "SCHEMA_ID", "the schema has no id", where)
+    for table in metadata.get("propertyTables", []):
+        for key, column in table.get("properties", {}).items():
+            try:
+                values = gltf.view(column["values"])
+                if "stringOffsets" not in column:
+                    continue
+                offsets = np.frombuffer(gltf.view(column["stringOffsets"]), "<u4")
+            except (ValueError, LookupError) as error:
+                yield Finding("error", "PROPERTY", f"{key}: {error}", where)
+                continue
+            expected = table["count"] + 1
+            if len(offsets) != expected or (np.diff(offsets.astype(np.int64)) < 0).any() or offsets[-1] > len(values):
+                message = f"{key}: {len(offsets)} string offsets up to {offsets[-1:]}, expected {expected} rising ones"
+                yield Finding("error", "STRING_OFFSETS", message, where)
+
+
+def _check_property_textures(gltf: Gltf) -> Iterator[Finding]:
+    metadata = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {})
+    classes = metadata.get("schema", {}).get("classes", {})
+    for index, holder in enumerate(metadata.get("propertyTextures", [])):
+        where = f"{gltf.path.name}: propertyTextures/{index}"
+        known = classes.get(holder.get("class"), {}).get("properties")
+        if known is None:
+            yield Finding("error", "PROPERTY_TEXTURE", f"class {holder.get('class')} is not in the schema", where)
+            continue
+        for key, texture in holder.get("properties", {}).items():
+            if key not in known:
+                yield Finding("error", "PROPERTY_TEXTURE", f"property {key} is not in its class", where)
+            if not 0 <= texture.get("index", -1) < len(gltf.items("textures")):
+                yield Finding("error", "PROPERTY_TEXTURE", f"{key}: no texture {texture.get('index')}", where)
+
+
+def _check_manifold(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
+    mesh = gltf.items("meshes")[index]
+    extension = mesh.get("extensions", {}).get("EXT_mesh_manifold")
+    if extension is None:
+        return
+    where = f"{where}/EXT_mesh_manifold"
+    solid = extension["manifoldPrimitive"]
+    accessor = gltf.items("accessors")[solid["indices"]]
+    if set(solid["attributes"]) != {"POSITION"} or "material" in solid:
+        yield Finding("error", "MANIFOLD", "manifoldPrimitive may have positions and indices only", where)
+    for primitive in mesh["primitives"]:
+        same = gltf.items("accessors")[primitive["indices"]]["bufferView"] == accessor["bufferView"]
+        if not same or primitive["attributes"]["POSITION"] != solid["attributes"]["POSITION"]:
+            yield Finding("error", "MANIFOLD", "manifoldPrimitive does not share indices and positions", where)
+    if len(mesh["primitives"]) != 1:
+        return
+    positions, faces = gltf.mesh_arrays(index)
+    merged = gltf.accessor(solid["indices"]).astype(np.int64).reshape(-1, 3)
+    if merged.shape != faces.shape or merged.max() >= len(positions):
+        yield Finding("error", "MANIFOLD", "manifoldPrimitive has other triangles than the mesh", where)
+    elif not np.array_equal(positions[faces], positions[merged]):
+        yield Finding("error", "MANIFOLD", "vertices at different positions are merged", where)
+    if "sparse" in accessor and not {"mergeIndices", "mergeValues"} <= set(extension):
+        yield Finding("error", "MANIFOLD", "sparse indices without mergeIndices and mergeValues", where)

@@ -1,0 +1,185 @@
+"""glTF 2.0, as one binary file or as .gltf with a .bin and a texture beside it.
+
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
+
+Without a profile, extensions are only ever *used*, never *required*: CesiumJS refuses files that require what it does
+not know, and every viewer shows the figure without them. `exporters.profiles` says what the files for one client hold.
+
+Place: the file has none of its own, and its node does not turn the figure. glTF has no georeference; the front of
+every model is +Z, and whoever puts it on a globe turns it: a tileset by its transform, CesiumJS by the heading of an
+entity, an artist by hand. A turned node would turn it twice there. Place and heading are in
+`asset.extras.georeference`. The one node transform that occurs, in quantised files, maps their integers to metres.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+
+from exporters.asset import Asset, Texture, TexturedMesh
+from exporters.errors import ExportError
+from exporters.georeference import georeference
+from exporters.gltf import xmp
+from exporters.gltf.document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
+from exporters.gltf.ktx2 import padded
+from exporters.gltf.material import linear_rgba, material, texture_file
+from exporters.gltf.meshopt import quantised, quantised_uv, reordered
+from exporters.gltf.part_borders import split_at_parts
+from exporters.gltf.part_features import evidence, features, manifold
+from exporters.profiles import GENERAL, Profile
+from exporters.solid import unit_normals
+
+
+def write_glb(asset: Asset, path: Path | str, profile: Profile = GENERAL) -> None:
+    """Write the finest level of detail as binary glTF, everything inside.
+
+    asset : vertices in the ASSET frame, written unchanged as float32 unless the profile compresses; its place goes
+        into `asset.extras`
+    path : the .glb file, replaced if it exists; see `exporters.write.write` for writing it whole or not at all
+    profile : what the file's client takes
+
+    Raises ExportError for a mesh without triangles or where the profile needs a package that is not installed,
+    OSError where the disk refuses.
+    """
+    Path(path).write_bytes(glb_bytes(asset, 0, profile))
+
+
+def glb_bytes(asset: Asset, lod: int = 0, profile: Profile = GENERAL) -> bytes:
+    """One level of detail of an asset as the bytes of a binary glTF file."""
+    document, texture = _build(asset, lod, profile)
+    if texture is not None:
+        image = document.json["images"][0]
+        data, image["mimeType"] = texture_file(texture, profile)
+        image["bufferView"] = document.view("texture", data)
+    return document.glb()
+
+
+def write_gltf(asset: Asset, path: Path | str, profile: Profile = GENERAL) -> None:
+    """Write the finest level of detail as glTF in JSON, with `<stem>.bin` and `<stem>_texture.png` beside it.
+
+    asset, profile, errors : as for `write_glb`; path : the .gltf file
+    """
+    path = Path(path)
+    document, texture = _build(asset, 0, profile)
+    if texture is not None:
+        file = path.with_name(path.stem + profile.texture_ending)
+        data, document.json["images"][0]["mimeType"] = texture_file(texture, profile)
+        file.write_bytes(data)
+        document.json["images"][0]["uri"] = quote(file.name)
+    binary = path.with_suffix(".bin")
+    binary.write_bytes(b"".join(document.chunks))
+    path.write_bytes(document.text({"uri": quote(binary.name), "byteLength": document.length}))
+
+
+def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture | None]:
+    """The document without the bytes of its image, and that image."""
+    mesh = split_at_parts(asset.lods[lod])
+    if not len(mesh.faces):
+        raise ExportError(asset.name, f"level of detail {lod} has no triangles", "give a mesh with triangles")
+    document = Document(profile.compressed)
+    node: dict[str, Any] = {"name": asset.name, "mesh": 0}
+    document.json["asset"] = _about(document, asset, profile)
+    document.json |= {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": [node]}
+    if profile.compressed:
+        mesh = reordered(mesh)
+    if profile.texture == "ktx2":
+        mesh = padded(mesh)
+    # 65535 itself is the restart index and must not occur.
+    index_type = np.uint16 if len(mesh.vertices) <= 65535 else np.uint32
+    corners = mesh.faces.reshape(-1).astype(index_type)
+    indices = document.accessor("indices", corners, ELEMENT_ARRAY_BUFFER, "TRIANGLES")
+    attributes = _attributes(document, mesh, node, asset.lit, profile)
+    primitive: dict[str, Any] = {
+        "attributes": attributes,
+        "indices": indices,
+        "material": material(document, mesh, asset.lit, profile),
+        "mode": 4,
+    }
+    item: dict[str, Any] = {"name": asset.name, "primitives": [primitive]}
+    if profile.extensions:
+        if mesh.parts is not None:
+            primitive["extensions"] = {"EXT_mesh_features": features(document, asset, mesh, attributes)}
+            shown = evidence(document, mesh)
+            if shown is not None:
+                primitive["extensions"]["EXT_structural_metadata"] = shown
+        solid = manifold(document, mesh, corners, indices, attributes["POSITION"])
+        if solid is not None:
+            item["extensions"] = {"EXT_mesh_manifold": solid}
+    elif mesh.parts is not None:
+        # Of core glTF alone: a custom attribute with the labels; what they mean is on the node.
+        attributes["_PART"] = document.accessor("part", mesh.parts.astype(np.float32), ARRAY_BUFFER, "ATTRIBUTES")
+    if not profile.extensions:
+        node |= _node_extras(asset, mesh)
+    document.add("meshes", item)
+    return document, mesh.texture
+
+
+def _about(document: Document, asset: Asset, profile: Profile) -> dict[str, Any]:
+    extras: dict[str, Any] = {}
+    if asset.placement is not None:
+        extras["georeference"] = georeference(asset.placement)
+    if asset.metadata:
+        extras["metadata"] = asset.metadata
+    about: dict[str, Any] = {"version": "2.0", "generator": "fig2mesh"}
+    if asset.copyright:
+        about["copyright"] = asset.copyright
+    if profile.extensions:
+        document.used.add(xmp.EXTENSION)
+        document.json["extensions"] = {xmp.EXTENSION: {"packets": [xmp.packet(asset)]}}
+        about["extensions"] = {xmp.EXTENSION: {"packet": 0}}
+    return about | ({"extras": extras} if extras else {})
+
+
+def _node_extras(asset: Asset, mesh: TexturedMesh) -> dict[str, Any]:
+    """Facts where clients without extensions look for them; Blender makes custom properties of them."""
+    extras: dict[str, Any] = {}
+    if mesh.parts is not None:
+        labels = np.unique(mesh.parts).tolist()
+        extras["parts"] = {str(label): asset.part_names.get(label, f"part_{label}") for label in labels}
+    if asset.placement is not None:
+        extras["georeference"] = georeference(asset.placement)
+    if asset.copyright:
+        extras["copyright"] = asset.copyright
+    return {"extras": extras} if extras else {}
+
+
+def _attributes(
+    document: Document, mesh: TexturedMesh, node: dict[str, Any], lit: bool, profile: Profile
+) -> dict[str, int]:
+    """Accessors of the vertices; quantised positions need a transform, which the node gets."""
+    normals = mesh.normals
+    if not profile.extensions and normals is None:
+        normals = mesh.shading_normals  # the surface will be lit, and smooth only with these
+    elif profile.compressed and not lit:
+        normals = None  # nothing that reads this file would look at them
+    attributes = {}
+
+    def add(semantic: str, name: str, array: Any, **more: Any) -> None:
+        attributes[semantic] = document.accessor(name, array, ARRAY_BUFFER, "ATTRIBUTES", **more)
+
+    if profile.compressed:
+        document.require("KHR_mesh_quantization")
+        positions = quantised(mesh.vertices)
+        node |= {"translation": list(positions.origin), "scale": [positions.scale] * 3}
+        add("POSITION", "position", positions.steps, normalized=True, **_bounds(positions.steps))
+        if normals is not None:
+            attributes["NORMAL"] = document.octahedral("normal", unit_normals(normals))
+        if mesh.uv is not None:
+            add("TEXCOORD_0", "texcoord", quantised_uv(mesh.uv), normalized=True)
+    else:
+        # tolist() of float32 gives the very doubles that a reader gets from the buffer.
+        add("POSITION", "position", mesh.vertices, **_bounds(mesh.vertices))
+        if normals is not None:
+            add("NORMAL", "normal", unit_normals(normals))
+        if mesh.uv is not None:
+            add("TEXCOORD_0", "texcoord", mesh.uv)
+    if mesh.texture is None and mesh.colors is not None and profile.vertex_colors:
+        add("COLOR_0", "color", linear_rgba(mesh.colors), normalized=True)
+    return attributes
+
+
+def _bounds(values: Any) -> dict[str, Any]:
+    return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}

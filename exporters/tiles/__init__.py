@@ -1,0 +1,1 @@
+"""3D Tiles: tilesets of one figure, trees over many, their checks and facts."""

@@ -1,0 +1,205 @@
+"""Batched 3D Models: what 3D Tiles 1.0 wraps round binary glTF, for clients that do not know version 1.1.
+
+https://github.com/CesiumGS/3d-tiles/tree/1.0/specification/TileFormats/Batched3DModel
+
+Feature ids and their table move from glTF extensions, which such clients do not know either, into the attribute
+`_BATCHID` and the batch table. Vertices are local to the tile, so no RTC_CENTER is needed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exporters.errors import ExportError
+from exporters.gltf.container import glb_of
+from exporters.gltf.reader import Gltf
+from georef.untrusted.json_file import parse_json
+
+HEADER = struct.Struct("<4sIIIIII")
+"""magic, version, bytes in all, of the feature table's JSON and binary, of the batch table's JSON and binary."""
+
+MESH_FEATURES, STRUCTURAL_METADATA = "EXT_mesh_features", "EXT_structural_metadata"
+# fmt: off
+SCALARS = {
+    "INT8": "<i1", "UINT8": "<u1", "INT16": "<i2", "UINT16": "<u2", "INT32": "<i4", "UINT32": "<u4",
+    "FLOAT32": "<f4", "FLOAT64": "<f8",
+}
+# fmt: on
+
+
+def b3dm_bytes(glb: bytes, name: Path | str) -> bytes:
+    """A binary glTF file as a batched 3D model.
+
+    glb : the file's bytes, as `exporters.gltf.glb` writes them
+    name : the file, for messages
+
+    Raises ExportError for what is no binary glTF, or needs extensions to be read.
+    """
+    gltf = glb_of(glb, Path(name))
+    required = gltf.document.get("extensionsRequired", [])
+    if required:
+        raise ExportError(name, f"needs {', '.join(required)}, newer than 3D Tiles 1.0", "give a plain .glb")
+    columns = _batch_table(gltf)
+    length = max((len(values) for values in columns.values()), default=0)
+    feature_table = _json({"BATCH_LENGTH": length}, HEADER.size)
+    batch_table = _json(columns, 0) if columns else b""
+    inside = _rewritten(gltf, batched=bool(columns))
+    total = HEADER.size + len(feature_table) + len(batch_table) + len(inside)
+    head = HEADER.pack(b"b3dm", 1, total, len(feature_table), 0, len(batch_table), 0)
+    return b"".join([head, feature_table, batch_table, inside])
+
+
+def _json(content: dict[str, Any], before: int) -> bytes:
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
+    return text + b" " * (-(before + len(text)) % 8)
+
+
+def part_table(gltf: Gltf) -> dict[str, list[Any]]:
+    """The columns of the one property table of a figure, property → values; empty where there is none."""
+    metadata = gltf.document.get("extensions", {}).get(STRUCTURAL_METADATA, {})
+    tables = metadata.get("propertyTables", [])
+    if len(tables) != 1:
+        return {}
+    table = tables[0]
+    kinds = metadata["schema"]["classes"][table["class"]]["properties"]
+    columns: dict[str, list[Any]] = {}
+    for key, column in table.get("properties", {}).items():
+        kind, data = kinds[key], bytes(gltf.view(column["values"]))
+        if kind.get("array"):
+            continue  # a batch table of 1.0 has no binary arrays, and figures have none
+        if kind["type"] == "STRING":
+            offsets = np.frombuffer(gltf.view(column["stringOffsets"]), "<u4").tolist()
+            columns[key] = [data[begin:end].decode() for begin, end in itertools.pairwise(offsets)]
+        elif kind["type"] == "SCALAR" and kind["componentType"] in SCALARS:
+            values = np.frombuffer(data, SCALARS[kind["componentType"]])[: table["count"]]
+            # The shortest decimals that give the same float32 back.
+            columns[key] = [float(str(value)) if values.dtype.kind == "f" else int(value) for value in values]
+    return columns
+
+
+def _batch_table(gltf: Gltf) -> dict[str, list[Any]]:
+    primitives = [each for mesh in gltf.items("meshes") for each in mesh["primitives"]]
+    features = [each.get("extensions", {}).get(MESH_FEATURES, {}).get("featureIds", [{}])[0] for each in primitives]
+    whole = all(each.get("propertyTable") == 0 and each.get("attribute") == 0 for each in features)
+    return part_table(gltf) if whole else {}
+
+
+def _rewritten(gltf: Gltf, batched: bool) -> bytes:
+    """The glTF without the extensions that carried the parts, and without the bytes that only they referred to."""
+    document: dict[str, Any] = json.loads(json.dumps(gltf.document))
+    metadata = document.get("extensions", {}).pop(STRUCTURAL_METADATA, {})
+    tables = metadata.get("propertyTables", [])
+    dropped = {
+        column[key]
+        for table in tables
+        for column in table.get("properties", {}).values()
+        for key in ("values", "stringOffsets", "arrayOffsets")
+        if key in column
+    }
+    dropped |= _without_images_of(document, metadata.get("propertyTextures", []))
+    if not document.get("extensions", True):
+        del document["extensions"]
+    used = [name for name in document.get("extensionsUsed", []) if name not in (MESH_FEATURES, STRUCTURAL_METADATA)]
+    document.pop("extensionsUsed", None)
+    if used:
+        document["extensionsUsed"] = used
+    for primitive in (each for mesh in document.get("meshes", []) for each in mesh["primitives"]):
+        for name in (MESH_FEATURES, STRUCTURAL_METADATA):
+            primitive.get("extensions", {}).pop(name, None)
+        if not primitive.get("extensions", True):
+            del primitive["extensions"]
+        if batched:
+            attributes = primitive["attributes"]
+            primitive["attributes"] = {("_BATCHID" if k == "_FEATURE_ID_0" else k): v for k, v in attributes.items()}
+    binary = _repacked(document, gltf, dropped)
+    document["buffers"] = [{"byteLength": len(binary)}]
+    text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+    # Both chunks fill multiples of eight bytes, as the whole tile has to; the headers of the chunks add 12 + 8 + 8.
+    text += b" " * ((4 - len(text)) % 8)
+    length = 12 + 8 + len(text) + 8 + len(binary)
+    head = struct.pack("<4sII", b"glTF", 2, length) + struct.pack("<I4s", len(text), b"JSON")
+    return b"".join([head, text, struct.pack("<I4s", len(binary), b"BIN\0"), binary])
+
+
+def _without_images_of(document: dict[str, Any], property_textures: list[dict[str, Any]]) -> set[int]:
+    """Take the textures of property textures away, where they are the last ones, with their images and samplers.
+
+    returns : the buffer views of those images
+    """
+    views: set[int] = set()
+    wanted = {each["index"] for holder in property_textures for each in holder.get("properties", {}).values()}
+    for index in sorted(wanted, reverse=True):
+        textures, images, samplers = (document.get(kind, []) for kind in ("textures", "images", "samplers"))
+        texture = textures[index]
+        # Others would have to be renumbered; ours come last.
+        if (index, texture.get("source"), texture.get("sampler")) != tuple(
+            len(items) - 1 for items in (textures, images, samplers)
+        ):
+            continue
+        textures.pop()
+        samplers.pop()
+        image = images.pop()
+        if "bufferView" in image:
+            views.add(image["bufferView"])
+    return views
+
+
+def _repacked(document: dict[str, Any], gltf: Gltf, dropped: set[int]) -> bytes:
+    """Buffer views without the dropped ones, one after the other; indices in the document are changed."""
+    kept = [index for index in range(len(gltf.items("bufferViews"))) if index not in dropped]
+    number = {old: new for new, old in enumerate(kept)}
+    chunks: list[bytes] = []
+    length = 0
+    views = []
+    for old in kept:
+        data = bytes(gltf.view(old))
+        view = document["bufferViews"][old] | {"buffer": 0, "byteOffset": length}
+        padded = data + bytes(-len(data) % 8)
+        chunks.append(padded)
+        length += len(padded)
+        views.append(view)
+    document["bufferViews"] = views
+    for accessor in document.get("accessors", []):
+        sparse = accessor.get("sparse", {})
+        for holder in (accessor, sparse.get("indices", {}), sparse.get("values", {})):
+            if "bufferView" in holder:
+                holder["bufferView"] = number[holder["bufferView"]]
+    for image in document.get("images", []):
+        if "bufferView" in image:
+            image["bufferView"] = number[image["bufferView"]]
+    return b"".join(chunks)
+
+
+@dataclass(frozen=True)
+class B3dm:
+    """A batched 3D model: its two tables' JSON and the binary glTF inside."""
+
+    feature_table: dict[str, Any]
+    batch_table: dict[str, Any]
+    glb: bytes
+
+
+def read_b3dm(data: bytes) -> B3dm:
+    """Take a batched 3D model apart. Raises ValueError where header, lengths or alignment break the rules."""
+    if len(data) < HEADER.size:
+        raise ValueError(f"{len(data)} bytes, less than the header")
+    magic, version, total, *lengths = HEADER.unpack_from(data)
+    if magic != b"b3dm" or version != 1:
+        raise ValueError(f"starts with {magic!r} version {version}, expected b'b3dm' version 1")
+    if total != len(data) or sum(lengths) + HEADER.size > total:
+        raise ValueError(f"header says {total} bytes with tables of {lengths}, file has {len(data)}")
+    ends = [HEADER.size + end for end in itertools.accumulate(lengths)]
+    if total % 8 or ends[1] % 8 or ends[3] % 8:
+        raise ValueError(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
+    feature_table = parse_json(data[HEADER.size : ends[0]])
+    batch_table = parse_json(data[ends[1] : ends[2]]) if lengths[2] else {}
+    if not isinstance(feature_table, dict) or not isinstance(batch_table, dict):
+        raise ValueError("a table is no JSON object")
+    return B3dm(feature_table, batch_table, data[ends[3] :])

@@ -1,0 +1,109 @@
+"""Metadata of 3D Tiles against their schema.
+
+https://github.com/CesiumGS/3d-tiles/tree/main/specification/Metadata
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from exporters.errors import ExportError
+from exporters.findings import Finding
+from georef.untrusted.json_file import read_json
+
+COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+def read_schema(document: dict[str, Any], path: Path) -> tuple[dict[str, Any] | None, list[Finding]]:
+    """The schema of a tileset or the file it names, None without one, and findings about it."""
+    name = path.name
+    schema = document.get("schema")
+    if schema is None and "schemaUri" in document:
+        uri = str(document["schemaUri"])
+        if "://" in uri:
+            return None, [Finding("info", "NOT_CHECKED", f"the schema {uri} is elsewhere", name)]
+        try:
+            schema = read_json(path.parent / unquote(uri), "write it again", ExportError)
+        except ExportError as error:
+            return None, [Finding("error", "SCHEMA", f"{uri} cannot be read ({error.finding})", name)]
+    if schema is None:
+        return None, []
+    if not isinstance(schema, dict) or not isinstance(schema.get("classes", {}), dict):
+        return None, [Finding("error", "SCHEMA", "the schema is no object with classes", name)]
+    return schema, [] if "id" in schema else [Finding("error", "SCHEMA_ID", "the schema has no id", name)]
+
+
+def check_entity(entity: Any, schema: dict[str, Any] | None, where: str) -> Iterator[Finding]:
+    """Findings about the metadata of a tileset, tile, group or content.
+
+    entity : {"class", "properties"}; schema : that of its tileset, None if it has none
+    """
+    if not isinstance(entity, dict):
+        yield Finding("error", "METADATA", "metadata is no object", where)
+        return
+    name = entity.get("class")
+    found = (schema or {}).get("classes", {}).get(name)
+    if found is None:
+        yield Finding("error", "METADATA", f"class {name} is not in the schema", where)
+        return
+    kinds, values = found.get("properties", {}), entity.get("properties", {})
+    for key, kind in kinds.items():
+        if kind.get("required") and key not in values:
+            yield Finding("error", "METADATA", f"{key}, which class {name} requires, is missing", where)
+    for key, value in values.items():
+        if key not in kinds:
+            yield Finding("error", "METADATA", f"{key} is not in class {name}", where)
+        elif not _fits_property(value, kinds[key], (schema or {}).get("enums", {})):
+            text = json.dumps(value, ensure_ascii=False)[:60]
+            yield Finding("error", "METADATA_TYPE", f"{key}: {text} is no {_named(kinds[key])}", where)
+
+
+def _named(kind: dict[str, Any]) -> str:
+    words = ["array of" if kind.get("array") else "", str(kind.get("componentType", "")), str(kind.get("type"))]
+    return " ".join(word for word in words if word)
+
+
+def _fits_property(value: Any, kind: dict[str, Any], enums: dict[str, Any]) -> bool:
+    if not kind.get("array"):
+        return _fits(value, kind, enums)
+    count = kind.get("count")
+    return (
+        isinstance(value, list)
+        and (count is None or len(value) == count)
+        and all(_fits(each, kind, enums) for each in value)
+    )
+
+
+def _fits(value: Any, kind: dict[str, Any], enums: dict[str, Any]) -> bool:
+    name = kind.get("type")
+    if name == "STRING":
+        return isinstance(value, str)
+    if name == "BOOLEAN":
+        return isinstance(value, bool)
+    if name == "ENUM":
+        known = enums.get(str(kind.get("enumType")), {}).get("values", [])
+        return value in [each.get("name") for each in known]
+    count = COMPONENTS.get(str(name))
+    if count is None:
+        return False
+    items = [value] if count == 1 else value
+    component = str(kind.get("componentType", ""))
+    return isinstance(items, list) and len(items) == count and all(_fits_component(each, component) for each in items)
+
+
+def _fits_component(value: Any, component: str) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return False
+    if component.startswith("FLOAT"):
+        return True
+    unsigned = component.startswith("UINT")
+    bits = component.removeprefix("UINT").removeprefix("INT")
+    if not bits.isdigit() or value != int(value):
+        return False
+    low, high = (0, 2 ** int(bits)) if unsigned else (-(2 ** (int(bits) - 1)), 2 ** (int(bits) - 1))
+    return bool(low <= value < high)

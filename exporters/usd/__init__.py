@@ -1,0 +1,1 @@
+"""OpenUSD: writing, checking and inspecting stages; strangers' stages are read in a process of their own."""

@@ -1,0 +1,1 @@
+"""Reading collections: rows of CSV, GeoJSON and GeoPackage files."""

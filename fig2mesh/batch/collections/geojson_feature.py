@@ -1,0 +1,257 @@
+"""A GeoJSON feature (RFC 7946), from the events of a streaming parser.
+
+What is not needed is skipped without being kept: geometries other than points, members that the format does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+import ijson
+
+from fig2mesh.batch.collections.rows import (
+    MAX_COLUMNS,
+    MAX_ITEMS,
+    MAX_NESTING,
+    MAX_RECORD,
+    MAX_TEXT,
+    Point,
+    Row,
+    Unfit,
+    column_name,
+    fit,
+    make_row,
+    shown,
+)
+
+Event = tuple[str, Any]
+Events = Iterator[Event]
+
+MAX_QUIET = 1 << 20
+"""Bytes of a file without a new value in them: a longer text than any row may have, or blanks."""
+
+MAX_DIGITS = 640
+"""Digits in a row: the fewest that Python can be told to refuse (`sys.set_int_max_str_digits`). What it refuses is
+not only no number: the parser of ijson in C (3.6) goes on with a null pointer after it."""
+
+CHUNK = 1 << 16
+
+OPEN = ("start_map", "start_array")
+CLOSE = ("end_map", "end_array")
+
+OBJECT = Unfit("a value that is an object", "give text, a number, or a list of them")
+DEEP = Unfit(f"lists nested deeper than {MAX_NESTING}", "flatten them")
+LONG = Unfit(f"a list of more than {MAX_ITEMS:,} items", "shorten it")
+TEXT = Unfit(f"more than {MAX_TEXT:,} characters", "give a shorter text")
+TWICE = Unfit("given twice", "give it once")
+
+BROKEN = (ijson.JSONError, ValueError, ArithmeticError)
+"""What the parsers of ijson raise for bytes that are not JSON: ValueError for texts that are not Unicode,
+ArithmeticError for exponents beyond all measure."""
+
+_DIGITS = bytes(ord("0") if chr(code).isdecimal() and code < 128 else ord(" ") for code in range(256))
+_TOO_MANY = b"0" * (MAX_DIGITS + 1)
+
+
+class NotJson(Exception):
+    """The parser's finding, in one line."""
+
+
+def events_of(stream: BinaryIO) -> Events:
+    """Events of ijson, where no value can fill the memory; raises NotJson after those before the fault."""
+    found = ijson.sendable_list()
+    parser = ijson.basic_parse_coro(found)
+    quiet, digits = 0, b""
+    try:
+        while data := stream.read(CHUNK):
+            quiet += len(data)
+            if quiet > MAX_QUIET + CHUNK:
+                raise NotJson(f"more than {MAX_QUIET:,} bytes without a new value")
+            digits += data.translate(_DIGITS)
+            if _TOO_MANY in digits:
+                raise NotJson(f"a number of more than {MAX_DIGITS} digits")
+            digits = digits[-MAX_DIGITS:]
+            fault = _fault(lambda data=data: parser.send(data))  # type: ignore[misc]
+            if found:
+                quiet = 0
+                yield from found
+                found.clear()
+            if fault:
+                raise NotJson(fault)
+        fault = _fault(parser.close)
+        yield from found
+        if fault:
+            raise NotJson(fault)
+    finally:
+        # A parser that is left in the middle of a document complains, on stderr if it is not asked.
+        _fault(parser.close)
+
+
+def _fault(act: Callable[[], object]) -> str | None:
+    """What a parser finds wrong, in one line."""
+    try:
+        act()
+    except BROKEN as error:
+        found = error.args[0] if error.args else type(error).__name__
+        text = found.decode("utf-8", "replace") if isinstance(found, bytes) else str(found)
+        return shown(text.partition("\n")[0].strip(), 100) or type(error).__name__
+    except StopIteration:
+        pass
+    return None
+
+
+@dataclass(slots=True)
+class Feature:
+    """Members of a GeoJSON object that are of use, and what was wrong with them."""
+
+    kind: object = None
+    properties: dict[str, object] = field(default_factory=dict)
+    geometry: Point | Unfit | None = None
+    problem: Unfit | None = None
+    seen: set[str] = field(default_factory=set)
+
+    def row(self, number: int, where: str) -> Row:
+        problem = self.problem
+        if self.kind != "Feature" and problem is None:
+            kind = "no type" if self.kind is None else f"type {shown(self.kind)}"
+            problem = Unfit(f"{kind} where a Feature is expected", "give features")
+        return make_row(number, where, self.properties.items(), problem, lambda: self.geometry)
+
+    def member(self, key: str, events: Events) -> None:
+        """Read the value of a member; those that are of no use are skipped."""
+        event, value = next(events)
+        if key not in ("type", "properties", "geometry"):
+            skip(events, event in OPEN)
+            return
+        if key in self.seen:
+            self.problem = self.problem or TWICE.of(key)
+        self.seen.add(key)
+        if key == "type":
+            self.kind = value if event == "string" else event
+            skip(events, event in OPEN)
+        elif event == "start_map" and key == "properties":
+            self.problem = _properties(events, self.properties) or self.problem
+        elif event == "start_map":
+            self.geometry = _geometry(events)
+        elif event != "null":
+            self.problem = self.problem or Unfit("no object", "give an object, or null").of(key)
+            skip(events, event in OPEN)
+
+
+def read_feature(events: Events, first: Event) -> Feature:
+    """A feature, from the first event of a value."""
+    feature = Feature()
+    event, value = first
+    if event != "start_map":
+        skip(events, event in OPEN)
+        feature.problem = Unfit("no object where a Feature is expected", "give features")
+        return feature
+    for event, value in events:
+        if event == "end_map":
+            break
+        feature.member(value, events)
+    return feature
+
+
+def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
+    """Read the members of an object into values by column; what is wrong with it as a whole, or None."""
+    problem: Unfit | None = None
+    room = MAX_RECORD
+    for event, key in events:
+        if event == "end_map":
+            break
+        event, value = next(events)
+        room -= len(key)
+        if problem is not None or room < 0 or len(found) >= MAX_COLUMNS:
+            if problem is None:
+                much = f"{MAX_COLUMNS:,} properties" if room >= 0 else f"{MAX_RECORD:,} characters in its properties"
+                problem = Unfit(f"more than {much}", "leave some out")
+            skip(events, event in OPEN)
+            continue
+        if event == "start_map":
+            skip(events, True)
+            value = OBJECT
+        elif event == "start_array":
+            value = _list(events, room)
+            room -= sum(_length(item) for item in value) if isinstance(value, tuple) else 0
+        elif event == "string":
+            room -= len(value)
+            value = value if len(value) <= MAX_TEXT else TEXT
+        name = column_name(key)
+        if not name:
+            value = Unfit("a property without a name", "name it") if value is not None else None
+        found[name] = TWICE if name in found else value
+    return problem
+
+
+def _length(value: object) -> int:
+    if isinstance(value, tuple):
+        return sum(map(_length, value))
+    return len(value) if isinstance(value, str) else 0
+
+
+def _list(events: Events, room: int = MAX_RECORD) -> tuple[object, ...] | Unfit:
+    """The rest of a list with the lists in it; room: characters that its texts may have."""
+    stack: list[list[object]] = [[]]
+    count = 0
+    for event, value in events:
+        if event == "end_array":
+            done = tuple(stack.pop())
+            if not stack:
+                return done
+            stack[-1].append(done)
+            continue
+        count += 1
+        bad = OBJECT if event == "start_map" else LONG if count > MAX_ITEMS else None
+        if event == "start_array":
+            bad = bad or (DEEP if len(stack) >= MAX_NESTING else None)
+        elif event == "string":
+            room -= len(value)
+            bad = bad or (TEXT if len(value) > MAX_TEXT or room < 0 else None)
+        if bad is not None:
+            skip(events, len(stack) + (event in OPEN))
+            return bad
+        if event == "start_array":
+            stack.append([])
+        else:
+            stack[-1].append(value)
+    raise AssertionError("a list that does not end is an error of the parser")
+
+
+def skip(events: Events, depth: int) -> None:
+    """Leave as many lists and objects, with all that is in them."""
+    if depth:
+        for event, _ in events:
+            depth += (event in OPEN) - (event in CLOSE)
+            if not depth:
+                return
+
+
+def _geometry(events: Events) -> Point | Unfit | None:
+    """The point of a geometry object; None: it is empty."""
+    kind: object = None
+    coordinates: object = None
+    for event, key in events:
+        if event == "end_map":
+            break
+        event, value = next(events)
+        if key == "coordinates" and event == "start_array":
+            coordinates = _list(events)
+        else:
+            skip(events, event in OPEN)
+            if key == "type":
+                kind = value
+    if kind == "MultiPoint" and isinstance(coordinates, tuple) and len(coordinates) == 1:
+        coordinates = coordinates[0]
+    elif kind != "Point":
+        return Unfit(f"its geometry is a {shown(kind)}", "give a Point, or columns lon and lat")
+    if coordinates == ():
+        return None
+    if not isinstance(coordinates, tuple) or len(coordinates) < 2:
+        return Unfit("a point without two coordinates", "give longitude and latitude")
+    numbers = [fit(each) for each in coordinates[:3]]
+    if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in numbers):
+        return Unfit(f"a point at {shown(coordinates)}", "give finite numbers")
+    return Point(*(float(each) for each in numbers))  # type: ignore[arg-type]

@@ -1,0 +1,75 @@
+"""Points of any reference system that pyproj can tie to WGS 84."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError, ProjError
+
+from fig2mesh.batch.collections.rows import Point, Unfit, shown
+
+HAND = "give columns lon and lat"
+
+
+def to_wgs84(
+    authority: object, code: object, definitions: Iterable[object]
+) -> Callable[[Sequence[Point]], Sequence[Point | Unfit]]:
+    """The transformation of a reference system, by its code (EPSG, 2056) or else one of its WKT definitions.
+
+    Heights are taken as they are, in metres above the ellipsoid, where the system says nothing of them; where it does,
+    they are converted, and refused if that needs a grid that is not there. Points that can't be transformed are Unfit.
+    """
+    crs = _crs(authority, code, definitions)
+    if crs is None:
+        unknown = Unfit("the reference system of its layer is not known", f"reproject it to WGS 84, or {HAND}")
+        return lambda points: [unknown] * len(points)
+    flat = _transformer(crs.to_2d(), "EPSG:4326")
+    solid = _transformer(crs, "EPSG:4979") if len(crs.axis_info) == 3 else None
+
+    def transform(points: Sequence[Point]) -> list[Point | Unfit]:
+        if flat is None:
+            nothing = Unfit(f"no transformation from {shown(crs.name)} to WGS 84 is known", HAND)
+            return [nothing] * len(points)
+        x, y = [each.lon for each in points], [each.lat for each in points]
+        lon, lat = flat.transform(x, y)
+        heights: Sequence[float | None] = [each.altitude for each in points]
+        if len(crs.axis_info) == 3:
+            z = [each.altitude or 0.0 for each in points]
+            above = [math.inf] * len(points) if solid is None else solid.transform(x, y, z)[2]
+            heights = [None if each is None else new for each, new in zip(heights, above, strict=True)]
+        return [_checked(crs, *place) for place in zip(lon, lat, heights, strict=True)]
+
+    return transform
+
+
+def _checked(crs: CRS, lon: float, lat: float, height: float | None) -> Point | Unfit:
+    if not (math.isfinite(lon) and math.isfinite(lat)):
+        return Unfit(f"a point outside the area of {shown(crs.name)}", "check the reference system of its layer")
+    if height is not None and not math.isfinite(height):
+        finding = f"no conversion of heights of {shown(crs.name)} to the ellipsoid is at hand"
+        return Unfit(finding, "drop z, and give columns altitude and altitude_datum")
+    return Point(lon, lat, height)
+
+
+def _crs(authority: object, code: object, definitions: Iterable[object]) -> CRS | None:
+    if isinstance(authority, str) and isinstance(code, int | str):
+        try:
+            return CRS.from_authority(authority, code)
+        except (CRSError, ValueError):
+            pass
+    for definition in definitions:
+        if isinstance(definition, str):
+            try:
+                return CRS.from_wkt(definition)
+            except (CRSError, ValueError):
+                continue
+    return None
+
+
+def _transformer(crs: CRS, target: str) -> Transformer | None:
+    try:
+        return Transformer.from_crs(crs, target, always_xy=True, allow_ballpark=False)
+    except ProjError:
+        return None

@@ -1,0 +1,335 @@
+"""`fig2mesh train`: one command a network; nothing heavy is imported before a command runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from fig2mesh.errors import InputError
+
+if TYPE_CHECKING:
+    from fig2mesh.training.bodies.pack import Pack
+
+KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
+"""`fig2mesh.skeleton.KINDS`, again, because that imports NumPy."""
+
+VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
+"""Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
+
+BUDGET_MIN = {
+    "pose": 60.0,
+    "size": 3.0,
+    "parts": 45.0,
+    "uv": 40.0,
+    "fill": 40.0,
+    "refine": 40.0,
+    "head": 20.0,
+    "parse": 240.0,
+}
+"""Minutes a network where neither --budget nor --epochs is given: hours for everything on two cores."""
+
+FOLDER = click.Path(path_type=Path, file_okay=False)
+
+
+def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The options that all commands have; `data` says what --data names."""
+    options = [
+        click.option("--data", type=click.Path(path_type=Path), required=True, metavar="PATH", help=data),
+        click.option("--budget", type=click.FloatRange(0, min_open=True), metavar="MIN", help="Minutes a network."),
+        click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True),
+        click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True),
+        click.option(
+            "-o",
+            "--output",
+            "out",
+            type=FOLDER,
+            required=True,
+            metavar="OUT",
+            help="Folder for weights, logs and checkpoints; a run that was cut off goes on there.",
+        ),
+    ]
+
+    def add(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+def kinds(command: Callable[..., None]) -> Callable[..., None]:
+    """The option --kind."""
+    option = click.option("--kind", "chosen", type=click.Choice(KINDS), multiple=True, help="Repeatable; default: all.")
+    return option(command)
+
+
+@click.group()
+def train() -> None:
+    """Train the networks; each command resumes what it finds in OUT."""
+
+
+@train.command()
+@common("The pack, or the folder that holds pack.npz.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Passes of 100,000 figures, instead of minutes.")
+@click.option("--joints", type=click.Choice(["16", "21"]), default="21", show_default=True)
+@click.option("--perspective", is_flag=True, help="Perspective drawings: predict x and y too.")
+@click.option("--visibility", is_flag=True, help="Which joints are hidden is an input.")
+@click.option("--limbs/--no-limbs", default=True, show_default=True, help="How foreshortened limbs are is an input.")
+@click.option("--dropout", type=click.FloatRange(0, 0.9), default=0.1, show_default=True, help="The paper: 0.5.")
+@click.option("--metric", is_flag=True, help="Trust the drawing's units, as the paper does.")
+@click.option("--plain", is_flag=True, help="Bodies as they are, from all around: the paper's protocol.")
+@click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N")
+def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, **given: Any) -> None:
+    """Depths of joints (table 1)."""
+    from fig2mesh.nets.pose_lift import PoseLiftShape
+    from fig2mesh.training.networks.train_pose import pack_skeletons, train_pose
+
+    shape = PoseLiftShape(
+        int(given["joints"]), given["perspective"], given["visibility"], given["limbs"], given["metric"]
+    )
+    known, held = pack_skeletons(_pack(data))
+    _, scores = train_pose(
+        known,
+        held,
+        out,
+        shape=shape,
+        augment=not given["plain"],
+        budget_min=_minutes("pose", budget, epochs),
+        steps=None if epochs is None else epochs * 100_000 // given["batch"],
+        seed=given["seed"],
+        dropout=given["dropout"],
+        batch=given["batch"],
+        device=_device(device),
+    )
+    _say({name: value for name, value in scores.items() if "_mean_" not in name})
+
+
+@train.command()
+@common("Folder of shards.")
+@kinds
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def size(
+    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, chosen: tuple[str, ...], seed: int
+) -> None:
+    """Sizes of parts."""
+    from fig2mesh.training.networks.train_size import train_size
+
+    for kind in chosen or KINDS:
+        click.echo(f"{kind}:")
+        _, scores = train_size(
+            data,
+            kind,
+            out / f"size-{kind}",
+            budget_min=_minutes("size", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            device=_device(device),
+        )
+        _say(scores)
+
+
+@train.command()
+@common("Folder of shards.")
+@kinds
+@click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True)
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Times that each part is seen in each view.")
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run in DIR/disn-….")
+def parts(
+    data: Path,
+    out: Path,
+    budget: float | None,
+    epochs: int | None,
+    device: str,
+    chosen: tuple[str, ...],
+    variant: str,
+    seed: int,
+    lr: float,
+    init: Path | None,
+) -> None:
+    """Shapes of parts (tables 2 and 3)."""
+    from fig2mesh.nets.disn import DisnShape
+    from fig2mesh.training.networks.train_parts import train_parts
+
+    for kind in chosen or KINDS:
+        click.echo(f"{kind}, {variant}:")
+        scores = train_parts(
+            data,
+            kind,
+            DisnShape.of(kind, variant),
+            out / f"disn-{kind}-{variant}",
+            budget_min=_minutes("parts", budget, epochs),
+            epochs=epochs,
+            seed=seed,
+            device=_device(device),
+            lr=lr,
+            init=None if init is None else init / f"disn-{kind}-{variant}",
+        )
+        _say(scores)
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@click.option("--masks/--no-masks", default=True, show_default=True, help="Part masks are an input.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
+def uv(
+    data: Path,
+    out: Path,
+    budget: float | None,
+    epochs: int | None,
+    device: str,
+    seed: int,
+    masks: bool,
+    lr: float,
+    init: Path | None,
+) -> None:
+    """Texture coordinates (table 4)."""
+    from fig2mesh.nets.uv_unet import UvUnetShape
+    from fig2mesh.training.networks.train_uv import train_uv
+
+    _say(
+        train_uv(
+            data,
+            out,
+            shape=UvUnetShape(masks),
+            budget_min=_minutes("uv", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            device=_device(device),
+            rate=lr,
+            init=init,
+        )
+    )
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int) -> None:
+    """Where unseen texels take their colours."""
+    from fig2mesh.training.networks.train_fill import train_fill
+
+    _say(
+        train_fill(
+            data,
+            out,
+            budget_min=_minutes("fill", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            device=_device(device),
+        )
+    )
+
+
+def filled(command: Callable[..., None]) -> Callable[..., None]:
+    """The option --fill."""
+    return click.option("--fill", type=FOLDER, required=True, metavar="DIR", help="What `train fill` made.")(command)
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@filled
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def refine(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
+    """Details of unseen sides."""
+    from fig2mesh.training.networks.train_refine import train_refine
+
+    _check_cpu(device)
+    steps = None if epochs is None else 1000 * epochs
+    _say(train_refine(data, fill, out, budget_min=_minutes("refine", budget, epochs), steps=steps, seed=seed))
+
+
+@train.command()
+@common("Folder of shards with pictures.")
+@filled
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+def head(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
+    """Heads of unseen sides."""
+    from fig2mesh.training.networks.train_refine import train_head
+
+    _check_cpu(device)
+    steps = None if epochs is None else 1000 * epochs
+    _say(train_head(data, fill, out, budget_min=_minutes("head", budget, epochs), steps=steps, seed=seed))
+
+
+@train.command()
+@common("Folder of crops.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--lr", type=click.FloatRange(0, min_open=True), default=1e-3, show_default=True, help="Learning rate.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
+@click.option(
+    "--blazepose",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    metavar="TFLITE",
+    help="Start the encoder from pose_landmark_full.tflite; docs/parsing.md says where it is from.",
+)
+@click.option("--whole", is_flag=True, help="Train the encoder's first stages too.")
+def parse(
+    data: Path,
+    out: Path,
+    budget: float | None,
+    epochs: int | None,
+    device: str,
+    seed: int,
+    lr: float,
+    init: Path | None,
+    blazepose: Path | None,
+    whole: bool,
+) -> None:
+    """Silhouette, parts and joints from a bare picture."""
+    from fig2mesh.training.networks.train_parse import train_parse
+
+    _check_cpu(device)
+    _say(
+        train_parse(
+            data,
+            out,
+            budget_min=_minutes("parse", budget, epochs),
+            steps=None if epochs is None else 1000 * epochs,
+            seed=seed,
+            rate=lr,
+            init=init,
+            blazepose=blazepose,
+            whole=whole,
+        )
+    )
+
+
+def add_to(cli: click.Group) -> None:
+    """Make `train` a command of `cli`."""
+    cli.add_command(train)
+
+
+def _minutes(network: str, budget: float | None, epochs: int | None) -> float | None:
+    return BUDGET_MIN[network] if budget is None and epochs is None else budget
+
+
+def _device(name: str) -> str:
+    import torch
+
+    if name == "cuda" and not torch.cuda.is_available():
+        raise InputError("--device cuda", "no CUDA device is here", "use --device cpu")
+    if name == "auto":
+        return "cuda" if torch.cuda.is_available() else "cpu"
+    return name
+
+
+def _check_cpu(name: str) -> None:
+    if name == "cuda":
+        raise InputError("--device cuda", "this network is trained on the CPU", "leave it out")
+
+
+def _pack(data: Path) -> Pack:
+    from fig2mesh.training.bodies.pack import load_pack
+
+    return load_pack(data / "pack.npz" if data.is_dir() else data)
+
+
+def _say(scores: dict[str, float]) -> None:
+    for name, value in scores.items():
+        click.echo(f"  {name}: {value:.4g}")

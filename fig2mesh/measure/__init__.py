@@ -1,0 +1,1 @@
+"""How good a model, a front view or the parser is: measures taken on results."""

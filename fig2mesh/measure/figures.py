@@ -1,0 +1,231 @@
+"""`fig2mesh evaluate figures`: every drawing of a folder through the main job, and all measures of what came out.
+
+The models are made 1.79 m high, as the limits of the measures are meant, and not written.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from exporters.asset import TexturedMesh
+from fig2mesh.asset_frame import asset_from_figure, on_drawing
+from fig2mesh.convert.pipeline import steps
+from fig2mesh.errors import InputError
+from fig2mesh.image_frame import image_frame
+from fig2mesh.measure.bleed import bleed_share
+from fig2mesh.measure.front import flange_share, gap, look, wall_share
+from fig2mesh.measure.model import front_similarity, silhouette_iou
+from fig2mesh.measure.solid import laws, quality, thinnest_wall
+from fig2mesh.mesh.simplify import deviation, simplify
+from fig2mesh.parse.read import read_figure
+from fig2mesh.parts.pieces import clean
+from fig2mesh.settings import Settings
+from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+
+LEVELS = 3
+COARSE = 5000
+"""Triangles of a further level, the same for every quality: what a map with hundreds of figures can afford."""
+
+Say = Callable[[str], None]
+Facts = dict[str, float | int | bool]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Files of one figure; mask is None where the picture's alpha channel is the silhouette."""
+
+    name: str
+    image: Path
+    keypoints: Path
+    mask: Path | None
+
+    def arguments(self) -> dict[str, Any]:
+        """Of `read_figure`."""
+        return {"path": self.image, "mask": self.mask, "keypoints": self.keypoints, "name": self.name}
+
+
+@dataclass(frozen=True)
+class Row:
+    """What came of one drawing: facts by the keys of `COLUMNS`, or the one line that says why there are none."""
+
+    name: str
+    facts: Facts
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One measure in the table: its key, heading, factor and format, and which end is the worse one."""
+
+    key: str
+    title: str
+    form: str = ".2f"
+    factor: float = 1.0
+    worse: Literal["least", "greatest"] = "greatest"
+
+
+COLUMNS = (
+    Column("silhouette_iou", "IoU %", ".1f", 100, "least"),
+    Column("front_psnr_db", "PSNR dB", ".1f", 1, "least"),
+    Column("front_ssim", "SSIM", ".3f", 1, "least"),
+    Column("bleed_share", "bleed %", ".2f", 100),
+    Column("gap_share", "gap %", ".2f", 100),
+    Column("gap_radius_mm", "gap mm", ".1f"),
+    Column("flange_share", "flange %", ".2f", 100),
+    Column("wall_share", "wall %", ".1f", 100),
+    Column("thinnest_mm", "thinnest mm", ".2f", 1, "least"),
+    Column("thinnest_quantile_mm", "thinnest 0.1 % mm", ".1f", 1, "least"),
+    Column("quality_least", "q least", ".3f", 1, "least"),
+    Column("quality_quantile", "q 1 %", ".2f", 1, "least"),
+    Column("slivers", "q < 0.05 %", ".3f", 100),
+    Column("closed", "closed", "yes", 1, "least"),
+    Column("manifold", "manifold", "yes", 1, "least"),
+    Column("components", "pieces", "d"),
+    Column("pieces_drawn", "drawn", "d"),
+    Column("genus", "genus", "d"),
+    Column("inner_shells", "inner shells", "d"),
+    Column("crossing", "crossing triangles", "d"),
+    Column("turned", "turned normals %", ".2f", 100),
+    *(
+        Column(f"{level}_{which}_deviation_mm", f"{title} {which} mm", ".2f")
+        for level, title in [*((f"lod{n}", f"level {n}") for n in range(LEVELS)), ("coarse", f"{COARSE:,}")]
+        for which in ("mean", "max")
+    ),
+)
+
+
+def find_drawings(folder: Path) -> tuple[Drawing, ...]:
+    """Figures of a folder by name: folders with image.png, and pairs of NAME.png and NAME.json (NAME_mask.png)."""
+    if not folder.is_dir():
+        raise InputError(folder, "no such folder", "name a folder of figures")
+    found = []
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and (path / "image.png").exists():
+            found.append(drawing_in(path))
+        elif path.suffix == ".png" and path.with_suffix(".json").exists():
+            mask = path.with_name(f"{path.stem}_mask.png")
+            found.append(Drawing(path.stem, path, path.with_suffix(".json"), mask if mask.exists() else None))
+    if not found:
+        remedy = "give folders with image.png and keypoints.json, or pairs of NAME.png and NAME.json"
+        raise InputError(folder, "no figures", remedy)
+    return tuple(found)
+
+
+def drawing_in(folder: Path) -> Drawing:
+    """The figure that a folder of image.png, keypoints.json and, where needed, mask.png is."""
+    mask = folder / "mask.png"
+    return Drawing(folder.name, folder / "image.png", folder / "keypoints.json", mask if mask.exists() else None)
+
+
+def evaluate_figures(drawings: tuple[Drawing, ...], settings: Settings, say: Say = lambda line: None) -> list[Row]:
+    """Make and measure a model of each drawing; what fails is told in its row and the others go on."""
+    rows = []
+    for number, drawing in enumerate(drawings, 1):
+        say(f"{number} of {len(drawings)}: {drawing.name}")
+        try:
+            rows.append(Row(drawing.name, measure_drawing(drawing, settings)))
+        except InputError as error:
+            rows.append(Row(drawing.name, {}, " ".join(str(error).split())))
+        except Exception as error:  # Whatever breaks one figure is a finding about that figure.
+            rows.append(Row(drawing.name, {}, f"{type(error).__name__}: {' '.join(str(error).split())}"))
+    return rows
+
+
+def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
+    """All measures of one drawing's model, by the keys of `COLUMNS`."""
+    figure = read_figure(**drawing.arguments())
+    settings = replace(settings, lods=LEVELS)
+    figure, pieces, _ = clean(figure, settings.voxel, settings.picture_px)
+    results: dict[str, Any] = {"figure": figure, "pieces": pieces}
+    for step in steps(settings, FIGURE_HEIGHT):
+        results[step.name] = step.run(*(results[name] for name in step.needs))
+    levels: tuple[TexturedMesh, ...] = results["model"]
+    model, solid = levels[0], results["solid"].mesh
+
+    frame = image_frame(figure)
+    asset = asset_from_figure(results["lift"], results["simplify"][0].vertices, FIGURE_HEIGHT)
+    pixel, origin_px = on_drawing(frame, asset)
+    similar = front_similarity(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    missing = gap(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    front, wall, shape, law = look(model), thinnest_wall(model), quality(model), laws(model)
+    # FIGURE units are metres at this height.
+    deviations = [level.deviation_m for level in levels] + [deviation(simplify(solid, COARSE), solid)]
+    names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
+    return {
+        "silhouette_iou": silhouette_iou(model, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
+        "front_psnr_db": similar.psnr_db,
+        "front_ssim": similar.ssim,
+        "bleed_share": bleed_share(model, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
+        "gap_share": missing.share,
+        "gap_radius_mm": missing.radius_mm,
+        "flange_share": flange_share(front),
+        "wall_share": wall_share(front),
+        "thinnest_mm": wall.least_mm,
+        "thinnest_quantile_mm": wall.quantile_mm,
+        "quality_least": shape.least,
+        "quality_quantile": shape.quantile,
+        "slivers": shape.slivers,
+        "closed": law.closed,
+        "manifold": law.manifold,
+        "components": law.components,
+        "pieces_drawn": pieces,
+        "genus": law.genus,
+        "inner_shells": law.inner_shells,
+        "crossing": law.crossing,
+        "turned": law.turned,
+        **{f"{name}_mean_deviation_mm": 1000 * mean for name, (mean, _) in zip(names, deviations, strict=True)},
+        **{f"{name}_max_deviation_mm": 1000 * most for name, (_, most) in zip(names, deviations, strict=True)},
+    }
+
+
+def summary(rows: list[Row]) -> tuple[Facts, Facts]:
+    """Median and worst of each measure over the figures that have one; for counts and laws too."""
+    median: Facts = {}
+    worst: Facts = {}
+    for column in COLUMNS:
+        values = [row.facts[column.key] for row in rows if row.facts]
+        if values:
+            median[column.key] = (
+                statistics.median_low(values) if column.form in ("d", "yes") else statistics.median(values)
+            )
+            worst[column.key] = min(values) if column.worse == "least" else max(values)
+    return median, worst
+
+
+def as_markdown(rows: list[Row]) -> str:
+    """A table with a line for each figure, then median and worst; figures without a model have their reason."""
+    lines = [
+        "| figure | " + " | ".join(column.title for column in COLUMNS) + " |",
+        "|---|" + "---:|" * len(COLUMNS),
+    ]
+    for row in rows:
+        # A bar would end the cell.
+        reason = row.failure.replace("|", "\\|")
+        cells = _cells(row.facts) if row.facts else [f"failed: {reason}", *[""] * (len(COLUMNS) - 1)]
+        lines.append(f"| {row.name} | " + " | ".join(cells) + " |")
+    for name, facts in zip(("**median**", "**worst**"), summary(rows), strict=True):
+        if facts:
+            lines.append(f"| {name} | " + " | ".join(_cells(facts)) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def as_json(rows: list[Row]) -> str:
+    """The same facts unrounded: lengths in mm, shares as fractions."""
+    median, worst = summary(rows)
+    figures: dict[str, Any] = {row.name: row.facts or {"failure": row.failure} for row in rows}
+    return json.dumps({"figures": figures, "median": median, "worst": worst}, indent=2, allow_nan=False) + "\n"
+
+
+def _cells(facts: Facts) -> list[str]:
+    def cell(column: Column) -> str:
+        value = facts[column.key]
+        if column.form == "yes":
+            return "yes" if value else "**no**"
+        return format(int(value) if column.form == "d" else column.factor * value, column.form)
+
+    return [cell(column) for column in COLUMNS]

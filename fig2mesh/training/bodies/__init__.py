@@ -1,0 +1,1 @@
+"""Bodies, garments, poses and motion clips."""

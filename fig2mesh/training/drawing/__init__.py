@@ -1,0 +1,1 @@
+"""Drawing bodies as pictorial maps draw people: inks, fills, faces, things worn and held, backgrounds."""

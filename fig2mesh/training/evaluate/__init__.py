@@ -1,0 +1,1 @@
+"""Scores of the networks on held-out data, beside the paper's."""

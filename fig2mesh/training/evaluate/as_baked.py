@@ -1,0 +1,79 @@
+"""What the main job puts on unseen sides, on bodies whose true shape is known.
+
+The front of a `Subject` goes down the main job's road as far as colours go: split into layers, areas found, networks
+asked. Shapes stay the true ones, so that the result can be compared pixel by pixel.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fig2mesh.image_frame import image_frame
+from fig2mesh.parts.canvas import make_canvas
+from fig2mesh.parts.layers import raise_layers
+from fig2mesh.parts.outline import Outline
+from fig2mesh.parts.split import split
+from fig2mesh.pose.prior import lift
+from fig2mesh.records import JOINT, Figure
+from fig2mesh.texture.sources import Sources, make_sources
+from fig2mesh.texture.space import inwards
+from fig2mesh.texture.unseen import LEAST_PX
+from fig2mesh.texture.votes import Unseen
+from fig2mesh.training.samples.textured_subject import Subject
+
+CANVAS_PX: Final = 512
+
+LEAST_DEEP: Final = 0.02
+"""Points this far behind what the front shows are not shown by it, units of depth."""
+
+TEXTURE: Final = 1024
+
+
+def baked_sides(subject: Subject, found: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(4, H, W, 3) 0-255, the colours that texels get at what each side shows.
+
+    found : (4, H, W, 2) where networks look for the colours, see `Sides.places`
+    """
+    sides = subject.sides
+    size = sides.labels.shape[1]
+    straight = _pixels(sides.places(), size)
+    sources = _sources(subject, straight, _pixels(found, size))
+    pixel = np.clip(straight.astype(int), 0, size - 1)
+    depth = np.where(sides.labels[0] > 0, sides.points[0, ..., 2], -np.inf)
+    drawn = sides.points[..., 2] >= depth[pixel[..., 1], pixel[..., 0]] - LEAST_DEEP
+    drawn[2] = False
+    result = sources.seen[pixel[..., 1], pixel[..., 0]]
+    for label in np.unique(sides.shown[sides.shown > 0]):
+        picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
+        own = ~drawn & (sides.shown == label)
+        at = np.clip((straight[own] * sources.plain_scale).astype(int), 0, np.array(picture.shape[1::-1]) - 1)
+        result[own] = picture[at[:, 1], at[:, 0]]
+    return np.asarray(result, np.float32)
+
+
+def _pixels(places: NDArray[np.floating], size: int) -> NDArray[np.float64]:
+    """Places with edges at -1 and 1 as pixels."""
+    return np.asarray((np.asarray(places, np.float64) + 1) / 2 * size)
+
+
+def _sources(subject: Subject, straight: NDArray[np.float64], found: NDArray[np.float64]) -> Sources:
+    sides = subject.sides
+    mask = sides.labels[0] > 0
+    rgba = np.full((*mask.shape, 4), 255, np.uint8)
+    rgba[..., :3] = np.clip(np.rint(subject.truth[0]), 0, 255)
+    visible = np.ones(len(subject.joints_px), bool)
+    visible[JOINT["eyes"]] = bool(subject.face.any())
+    figure = Figure("subject", rgba, mask, subject.joints_px, visible, np.zeros(mask.shape, np.uint8))
+    frame = image_frame(figure)
+    canvas = make_canvas(figure, frame, CANVAS_PX)
+    joints = lift(figure, frame).joints.astype(np.float64)
+    divided = split(canvas, joints, visible)
+    outline = Outline((), divided, raise_layers(canvas, divided, joints, "cpu"), canvas)
+    used = inwards(sides.labels > 0) > LEAST_PX
+    used[0] = False
+    points, named = (frame.figure_from_image(pixels[used]).astype(np.float32) for pixels in (straight, found))
+    unseen = Unseen(sides.shown[used], points, named)
+    return make_sources(figure, frame, outline, TEXTURE, 0, lambda picture: unseen)

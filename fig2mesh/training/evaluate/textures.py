@@ -1,0 +1,247 @@
+"""Textures on bodies that training never saw: texture coordinates (table 4), and the sides that a drawing hides.
+
+The sides are made from the front picture alone and compared with what the draughtsman of the training data made of
+them. Shapes, labels and depths are the true ones, so that textures alone are measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from fig2mesh.nets import uv_unet
+from fig2mesh.nets.head_hsv import head_path, read_head
+from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
+from fig2mesh.nets.view_refine import read_refine, refine_path
+from fig2mesh.records import PART
+from fig2mesh.texture.space import spread
+from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
+from fig2mesh.training.evaluate.as_baked import baked_sides
+from fig2mesh.training.evaluate.networks import SPLIT_TITLE, SPLITS, table
+from fig2mesh.training.evaluate.paper import UV_SCORES
+from fig2mesh.training.networks.train_uv import scores
+from fig2mesh.training.samples.texture_data import load_drawings
+from fig2mesh.training.samples.textured_subject import Subject, subjects
+
+Picture = NDArray[np.float32]
+Say = Callable[[str], None]
+
+# fmt: off
+BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
+    "as the main job bakes them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
+    "coordinates, refined", "coordinates",
+)
+# fmt: on
+# fmt: off
+STRAIGHT, NEAREST, INPAINTED = (
+    "straight through the body", "nearest seen point", "OpenCV inpainting in texture space",
+)
+# fmt: on
+ROADS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
+"""Ways to make unseen sides; the last three are baselines."""
+
+PLACED: Final = (BAKED, DRAWN, COORDINATES, STRAIGHT)
+"""Ways that know where in the drawing each colour is from."""
+
+NEEDS_REFINER: Final = (DRAWN, HEADS, REFINED)
+
+COLOUR_WEIGHT: Final = 1.0
+"""Half pictures of distance that a difference between black and white is worth, in looking for a drawn colour."""
+
+UNCHANGED, UNLIKE = 30.0, 40.0
+"""Largest difference of a channel (0-255) between colours that are the same, and least between those that are not."""
+
+TEXTURE: Final = 256
+"""Texels of an edge for inpainting colours."""
+
+PALETTE: Final = 400
+"""Pixels of each picture whose colours are compared as palettes."""
+
+
+def painted(subject: Subject, road: str, nets: TextureNets) -> tuple[Picture, Picture]:
+    """The sides as one way to make them has them, from the front picture alone.
+
+    Returns
+    -------
+    (4, H, W, 3) colours, 0-255; (4, H, W, 2) where in the front each is from, as far as that is known, edges at -1, 1
+    """
+    sides, front = subject.sides, subject.front
+    seen = sides.labels > 0
+    straight = sides.places()
+    if road in (HEADS, REFINED):
+        return paint(sides, front, nets if road == HEADS else replace(nets, head=None)), straight
+    if road == STRAIGHT:
+        return _sampled(front, straight), straight
+    if road == NEAREST:
+        source = sides.points[0][seen[0]]
+        _, index = cKDTree(source).query(sides.points[seen])
+        result = np.zeros((*seen.shape, 3), np.float32)
+        result[seen] = front[seen[0]][index]
+        return result, straight
+    if road == INPAINTED:
+        return _inpainted(subject, nets), straight
+    found = straight + unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    if road == COORDINATES:
+        return _sampled(front, found), found
+    if road == BAKED:
+        return baked_sides(subject, found), straight
+    return _in_drawn_colours(paint(sides, front, replace(nets, head=None)), found, front, seen)
+
+
+def _in_drawn_colours(
+    made: Picture, place: Picture, front: Picture, seen: NDArray[np.bool_]
+) -> tuple[Picture, Picture]:
+    """Colours replaced by those of drawn pixels that are most like them and near to where they were looked for."""
+    size = front.shape[0]
+    rows, columns = np.nonzero(seen[0])
+    at = np.stack([columns + 0.5, rows + 0.5], axis=1) / size * 2 - 1
+    tree = cKDTree(np.concatenate([COLOUR_WEIGHT * front[seen[0]] / 255, at], axis=1))
+    _, index = tree.query(np.concatenate([COLOUR_WEIGHT * made[seen] / 255, place[seen]], axis=1))
+    result, where = np.zeros_like(made), place.copy()
+    result[seen], where[seen] = front[seen[0]][index], at[index]
+    return result, where
+
+
+def _sampled(front: Picture, place: NDArray[np.floating]) -> Picture:
+    size = front.shape[0]
+    where = np.moveaxis((place[..., ::-1] + 1) / 2 * size - 0.5, -1, 0)
+    return np.stack(
+        [ndimage.map_coordinates(front[..., c], where, order=1, mode="nearest") for c in range(3)], axis=-1
+    ).astype(np.float32)
+
+
+def _inpainted(subject: Subject, nets: TextureNets) -> Picture:
+    """Colours of the front in texture space, the rest of the texture by `cv2.inpaint` after Telea 2004."""
+    import cv2
+
+    sides = subject.sides
+    seen = sides.labels > 0
+    coordinates = texture_coordinates(sides, nets.uv)
+    known, weight = spread(coordinates[0][seen[0]], subject.front[seen[0]], np.ones(seen[0].sum()), TEXTURE)
+    hole = np.where(weight > 0, np.uint8(0), np.uint8(255))
+    texture = cv2.inpaint(np.clip(known, 0, 255).astype(np.uint8), hole, 3.0, cv2.INPAINT_TELEA)
+    cell = np.clip((coordinates * TEXTURE).astype(int), 0, TEXTURE - 1)
+    return np.asarray(texture[cell[..., 1], cell[..., 0]], np.float32)
+
+
+def compare(made: Picture, truth: Picture, mask: NDArray[np.bool_]) -> tuple[float, float, float]:
+    """PSNR in dB, SSIM and palette distance (CIELAB units) of one side inside of the body.
+
+    Palette distance: mean distance from a pixel's colour to the nearest colour of the other picture, both ways: what
+    colours there are, wherever they are.
+    """
+    from skimage.color import rgb2lab
+    from skimage.metrics import structural_similarity
+
+    error = ((made - truth)[mask] / 255) ** 2
+    psnr = 10 * np.log10(1 / max(float(error.mean()), 1e-9))
+    flat = [np.where(mask[..., None], picture, 127.0) for picture in (made, truth)]
+    _, similar = structural_similarity(*flat, channel_axis=2, data_range=255.0, full=True)
+    rows = np.random.default_rng(0).permutation(int(mask.sum()))[:PALETTE]
+    ours, theirs = (rgb2lab(np.clip(picture[mask][rows] / 255, 0, 1)) for picture in (made, truth))
+    apart = cKDTree(theirs).query(ours)[0].mean() + cKDTree(ours).query(theirs)[0].mean()
+    return float(psnr), float(similar[mask].mean()), float(apart) / 2
+
+
+def face_share(made: Picture, place: Picture, subject: Subject) -> tuple[float, float]:
+    """Shares of the head's pixels, seen from behind, that show what the drawing has in the face, and of those among
+    them where the truth is another colour.
+
+    place : where in the front the colours `made` are from, see `painted`
+    """
+    back = subject.sides.labels[2] == PART["head"]
+    if not back.any() or not subject.face.any():
+        return float("nan"), float("nan")
+    size = back.shape[0]
+    pixel = np.clip(((place[2][back] + 1) / 2 * size).astype(int), 0, size - 1)
+    column, row = pixel[:, 0], pixel[:, 1]
+    alike = np.abs(made[2][back] - subject.front[row, column]).max(axis=1) < UNCHANGED
+    shown = subject.face[row, column] & alike
+    wrong = np.abs(made[2][back] - subject.truth[2][back]).max(axis=1) > UNLIKE
+    return float(shown.mean()), float((shown & wrong).mean())
+
+
+def evaluate_textures(data: Path, runs: Path | None, bodies: int, say: Say = lambda line: None) -> str:
+    """The report as Markdown; runs : folder of networks that are not shipped: without masks, and those that refine."""
+    say("Table 4: texture coordinates")
+    sections = [
+        "# Textures",
+        "Written by `fig2mesh evaluate textures`; [training.md](training.md) says how data and weights were made.",
+        "## Table 4: texture coordinates",
+        _uv_table(data, runs, bodies),
+    ]
+    say("Unseen sides")
+    sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs))]
+    return "\n\n".join(sections) + "\n"
+
+
+def _uv_table(data: Path, runs: Path | None, bodies: int) -> str:
+    rows = []
+    for masks, title in ((False, "depth"), (True, "depth × part masks (shipped)")):
+        files = sorted(runs.rglob(uv_path(UvUnetShape(masks)).name)) if runs is not None else []
+        net = uv_unet.load() if masks else read_uv(files[0])[0] if files else None
+        cells = []
+        for split in SPLITS:
+            if net is None:
+                cells += ["not trained", ""]
+                continue
+            found = scores(net, load_drawings(data, (split,), pictures=False, most=bodies))
+            cells += [f"{found['mae']:.4f}", f"{found['rmse']:.4f}"]
+        rows.append((title, *(f"{value:.3f}" for value in UV_SCORES[masks]), *cells))
+    head = ["input", "paper MAE", "paper RMSE"]
+    head += [f"{SPLIT_TITLE[split]}: {what}" for split in SPLITS for what in ("MAE", "RMSE")]
+    text = f"Texture units (0 to 1), over all pixels of four sides of {bodies} bodies a split that have coordinates."
+    return f"{text}\n\n{table(head, rows)}"
+
+
+def _networks(runs: Path | None) -> TextureNets:
+    """The shipped networks, and those that refine what they paint where they have been trained."""
+    nets = shipped()
+    refining, heads = (
+        sorted(runs.rglob(path(Path()).name)) if runs is not None else [] for path in (refine_path, head_path)
+    )
+    return replace(
+        nets,
+        refine=read_refine(refining[0])[0] if refining else None,
+        head=read_head(heads[0])[0] if heads else None,
+    )
+
+
+def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
+    absent = {HEADS} if nets.head is None else set()
+    absent |= set(NEEDS_REFINER) if nets.refine is None else set()
+    roads = [road for road in ROADS if road not in absent]
+    rows, faces = [], []
+    for split in SPLITS:
+        chosen = subjects(data, split, bodies)
+        for road in roads:
+            found: dict[str, list[tuple[float, float, float]]] = {"back": [], "sides": []}
+            shares = []
+            for subject in chosen:
+                made, place = painted(subject, road, nets)
+                shares.append(face_share(made, place, subject))
+                for view in (1, 2, 3):
+                    mask = subject.sides.labels[view] > 0
+                    found["back" if view == 2 else "sides"].append(compare(made[view], subject.truth[view], mask))
+            means = [np.mean(values, axis=0) for values in found.values()]
+            title = f"{SPLIT_TITLE[split]}: {road}"
+            rows.append((title, *(cell for m in means for cell in (f"{m[0]:.2f}", f"{m[1]:.3f}", f"{m[2]:.2f}"))))
+            if road in PLACED:
+                faces.append((title, *(f"{100 * share:.1f}" for share in np.nanmean(shares, axis=0))))
+    head = ["way", *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette"))]
+    text = (
+        f"{bodies} bodies a split; means over pictures of 256 x 256 pixels, inside of the body. Palette: mean distance "
+        "to the nearest colour of the other picture, CIELAB units, both ways."
+    )
+    share = (
+        "Percent of the back of heads that shows what the drawing has between brows and chin, skin included; and as far"
+        " as the truth has another colour there:"
+    )
+    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('way', 'face', 'face, wrongly'), faces)}"

@@ -1,0 +1,156 @@
+"""Train the network that tells where in the drawing unseen texels take their colours, and score it.
+
+Scores are over texels that the front does not show, weighted by how well other sides show them: PSNR of colours, and
+the same for colours taken straight through the body (`front_psnr`), which is what an untrained network gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, fill_path, sample, save_fill
+from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.training.samples.build import recipe_digest
+from fig2mesh.training.samples.part_data import HELD_OUT
+from fig2mesh.training.samples.texture_data import load_drawings
+from fig2mesh.training.samples.unfold import Unfolded, unfold
+
+BATCH: Final = 8
+RATE: Final = 2e-3
+
+SEEN_WEIGHT: Final = 0.2
+"""Texels that the front shows count so much beside those it does not."""
+
+COARSE: Final = 8
+"""Pixels of the front that are one in a second, coarse picture: its gradient tells of colours further away."""
+
+SMOOTH: Final = 0.02
+OUTSIDE: Final = 0.1
+
+
+class Texels(NamedTuple):
+    """A batch: inputs (N, 8, S, S), place (N, 2, S, S), truth (N, 3, S, S) 0-1, weight (N, S, S), seen (N, S, S),
+    front (N, 3, H, W) 0-1, inside (N, 1, H, W)."""
+
+    inputs: Tensor
+    place: Tensor
+    truth: Tensor
+    weight: Tensor
+    seen: Tensor
+    front: Tensor
+    inside: Tensor
+
+
+def train_fill(
+    data: Path,
+    out: Path,
+    *,
+    budget_min: float | None = None,
+    steps: int | None = None,
+    seed: int = 0,
+    batch: int = BATCH,
+    rate: float = RATE,
+    device: str = "cpu",
+    amp: bool = True,
+) -> dict[str, float]:
+    """Scores on the held-out splits; writes all that training leaves.
+
+    amp : compute in bfloat16, which processors that have it do three times as fast
+    """
+    known = unfold(load_drawings(data, ("train",), pictures=True))
+    held = {split: unfold(load_drawings(data, (split,), pictures=True, most=24)) for split in HELD_OUT}
+    net = seeded(seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
+
+    def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
+        rows = torch.randint(len(known), (batch,), generator=generator).numpy()
+        return losses(model, Texels(*(t.to(device) for t in gather(known, rows))))
+
+    def validate() -> Mapping[str, float]:
+        return scores(net, held["valid-clips"], device)
+
+    optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
+    result = run_loop(
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=100,
+        clip=1.0,
+        device=device,
+        amp=amp,
+        validations=6,
+        arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
+    )
+    found = {
+        f"{split}_{name}": value
+        for split, bodies in held.items()
+        for name, value in scores(net, bodies, device).items()
+    }
+    write_scores(out, found)
+    facts = {
+        "data": recipe_digest(data),
+        "bodies": len(known),
+        "seed": seed,
+        "steps": result.steps,
+        "samples": result.samples,
+        "scores": found,
+    }
+    save_fill(fill_path(out), net, facts)
+    return found
+
+
+def gather(bodies: Unfolded, rows: np.ndarray) -> Texels:
+    """Some bodies as tensors."""
+    place = torch.from_numpy(bodies.place[rows].astype(np.float32)).movedim(3, 1)
+    front = torch.from_numpy(bodies.front[rows].astype(np.float32) / 255).movedim(3, 1)
+    there, seen, same = (torch.from_numpy(array[rows]) for array in (bodies.there, bodies.seen, bodies.same))
+    truth = torch.from_numpy(bodies.truth[rows].astype(np.float32) / 255).movedim(3, 1)
+    weight = torch.from_numpy(bodies.weight[rows].astype(np.float32))
+    inside = torch.from_numpy(bodies.inside[rows].astype(np.float32))[:, None]
+    inputs = fill_inputs(place, there, seen, same, sample(front, place))
+    return Texels(inputs, place, truth, weight, seen, front, inside)
+
+
+def losses(model: torch.nn.Module, texels: Texels) -> dict[str, Tensor]:
+    """Colours at the changed places against the truth, unevenness of the change, and places outside of the figure."""
+    change = model(texels.inputs)
+    place = texels.place + change
+    weight = texels.weight * torch.where(texels.seen, SEEN_WEIGHT, 1.0)
+    total = weight.sum().clamp_min(1e-6)
+    blurred = functional.avg_pool2d(texels.front, COARSE)
+    fine, coarse = ((sample(picture, place) - texels.truth).abs().mean(dim=1) for picture in (texels.front, blurred))
+    colour = ((fine + coarse) * weight).sum() / total
+    known = texels.weight > 0
+    across = (change[..., 1:] - change[..., :-1]).abs().sum(dim=1) * (known[..., 1:] & known[..., :-1])
+    down = (change[..., 1:, :] - change[..., :-1, :]).abs().sum(dim=1) * (known[:, 1:] & known[:, :-1])
+    rough = (across.sum() + down.sum()) / known.sum().clamp_min(1)
+    outside = ((1 - sample(texels.inside, place)[:, 0]) * weight).sum() / total
+    return {"loss": colour + SMOOTH * rough + OUTSIDE * outside, "colour": colour.detach()}
+
+
+@torch.no_grad()
+def scores(net: TextureFill, bodies: Unfolded, device: str = "cpu") -> dict[str, float]:
+    """PSNR of unseen texels, dB, of the network and of places straight through the body."""
+    sums = np.zeros(3)
+    for first in range(0, len(bodies), BATCH):
+        rows = np.arange(first, min(first + BATCH, len(bodies)))
+        texels = Texels(*(t.to(device) for t in gather(bodies, rows)))
+        weight = texels.weight * ~texels.seen
+        for index, place in enumerate((texels.place + net(texels.inputs), texels.place)):
+            error = (sample(texels.front, place) - texels.truth).square().mean(dim=1)
+            sums[index] += float((error * weight).sum())
+        sums[2] += float(weight.sum())
+    ours, straight = (10 * np.log10(sums[2] / max(total, 1e-12)) for total in sums[:2])
+    return {"psnr": float(ours), "front_psnr": float(straight)}

@@ -1,0 +1,228 @@
+"""Train the networks that add details to painted sides: the whole side, and its head by the HSV autoencoder.
+
+Scores are over unseen sides: mean absolute error of colours 0-1, and the same for the painted sides as they went in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from fig2mesh.nets.head_hsv import (
+    HeadHsv,
+    HeadShape,
+    disc_value,
+    head_inputs,
+    head_path,
+    head_window,
+    rgb_of,
+    save_head,
+)
+from fig2mesh.nets.texture_fill import fill_path, read_fill
+from fig2mesh.nets.view_refine import RefineShape, ViewRefine, refine, refine_inputs, refine_path, save_refine
+from fig2mesh.records import PART
+from fig2mesh.training.networks.loop import Result, run_loop, seeded, write_scores
+from fig2mesh.training.samples.build import recipe_digest
+from fig2mesh.training.samples.painted import Painter, Sides, painters
+from fig2mesh.training.samples.part_data import HELD_OUT
+
+BATCH: Final = 8
+HEADS: Final = 32
+RATE: Final = 1e-3
+EDGE_WEIGHT: Final = 0.5
+
+Scores = dict[str, float]
+
+
+def train_refine(
+    data: Path,
+    fill: Path,
+    out: Path,
+    *,
+    budget_min: float | None = None,
+    steps: int | None = None,
+    seed: int = 0,
+    batch: int = BATCH,
+    filters: int = RefineShape.filters,
+) -> Scores:
+    """Scores on the held-out splits; writes all that training leaves.
+
+    fill : folder with the weights of the network that paints the sides
+    """
+    known, held = _painters(data, fill)
+    net = seeded(seed, lambda: ViewRefine(RefineShape(filters)))
+
+    def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
+        sides = _draw(known, batch, generator)
+        inputs = refine_inputs(sides.painted, sides.uv, sides.depth, sides.labels)
+        found = sides.painted + model(inputs)
+        return {"loss": picture_loss(found, sides.truth, sides.known)}
+
+    result = _run(net, step, lambda: refine_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
+    found = {
+        f"{split}_{name}": value
+        for split, painter in held.items()
+        for name, value in refine_scores(net, painter).items()
+    }
+    save_refine(refine_path(out), net, _facts(data, len(known), seed, result, found, out))
+    return found
+
+
+def train_head(
+    data: Path,
+    fill: Path,
+    out: Path,
+    *,
+    budget_min: float | None = None,
+    steps: int | None = None,
+    seed: int = 0,
+    batch: int = HEADS,
+    shape: HeadShape = HeadShape(),  # noqa: B008 - frozen
+) -> Scores:
+    """Scores on the held-out splits; writes all that training leaves."""
+    known, held = _painters(data, fill)
+    net = seeded(seed, lambda: HeadHsv(shape))
+
+    def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
+        crops = _heads(_draw(known, batch, generator))
+        angle = 2 * math.pi * float(torch.rand((), generator=generator))
+        painted, truth = (_turned(disc_value(c), angle) for c in (crops[:, :3], crops[:, 3:6]))
+        noise = 0.03 * torch.randn(painted.shape, generator=generator) * torch.rand(len(painted), 1, 1, 1)
+        there = crops[:, 8] > 0.5
+        inputs = head_inputs(crops[:, :3], crops[:, 6:8], there)
+        inputs = torch.cat([(painted + noise) * there[:, None], inputs[:, 3:]], dim=1)
+        return head_losses(model(inputs), truth, there)
+
+    result = _run(net, step, lambda: head_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
+    found = {
+        f"{split}_{name}": value for split, painter in held.items() for name, value in head_scores(net, painter).items()
+    }
+    save_head(head_path(out), net, _facts(data, len(known), seed, result, found, out))
+    return found
+
+
+def picture_loss(found: Tensor, truth: Tensor, known: Tensor) -> Tensor:
+    """Mean absolute error of colours and of their steps from pixel to pixel, where they are known."""
+    mask = known[:, None].float()
+    error = ((found - truth).abs() * mask).sum() / (3 * mask.sum().clamp_min(1))
+    edges = torch.zeros((), device=found.device)
+    for axis in (2, 3):
+        both = torch.diff(mask, dim=axis).abs() < 0.5
+        both = both & (mask.narrow(axis, 1, mask.shape[axis] - 1) > 0)
+        step = (torch.diff(found, dim=axis) - torch.diff(truth, dim=axis)).abs()
+        edges = edges + (step * both).sum() / (3 * both.sum().clamp_min(1))
+    return error + EDGE_WEIGHT * edges
+
+
+def head_losses(found: Tensor, truth: Tensor, there: Tensor) -> dict[str, Tensor]:
+    """Colour disc and value count alike (paper §4.4)."""
+    count = there.sum().clamp_min(1)
+    colour = ((found[:, :2] - truth[:, :2]).abs().sum(dim=1) * there).sum() / (2 * count)
+    value = ((found[:, 2] - truth[:, 2]).abs() * there).sum() / count
+    return {"loss": colour + value, "colour": colour.detach(), "value": value.detach()}
+
+
+def refine_scores(net: ViewRefine, painter: Painter) -> Scores:
+    """Mean absolute errors over the three unseen sides."""
+    sums = np.zeros(3)
+    for row in range(len(painter)):
+        sides = painter.sides(np.full(3, row), np.arange(1, 4))
+        made = refine(net, sides.painted, sides.uv, sides.depth, sides.labels)
+        mask = sides.known[:, None]
+        sums += [float(((c - sides.truth).abs() * mask).sum()) for c in (made, sides.painted)] + [3 * int(mask.sum())]
+    return {"mae": float(sums[0] / max(sums[2], 1)), "painted_mae": float(sums[1] / max(sums[2], 1))}
+
+
+@torch.no_grad()
+def head_scores(net: HeadHsv, painter: Painter) -> Scores:
+    """Mean absolute errors over the heads of the three unseen sides."""
+    sums = np.zeros(3)
+    for row in range(len(painter)):
+        crops = _heads(painter.sides(np.full(3, row), np.arange(1, 4)))
+        there = crops[:, 8] > 0.5
+        made = rgb_of(net(head_inputs(crops[:, :3], crops[:, 6:8], there)))
+        truth = crops[:, 3:6]
+        errors = [float(((c - truth).abs() * there[:, None]).sum()) for c in (made, crops[:, :3])]
+        sums += [*errors, 3 * int(there.sum())]
+    return {"mae": float(sums[0] / max(sums[2], 1)), "painted_mae": float(sums[1] / max(sums[2], 1))}
+
+
+def _painters(data: Path, fill: Path) -> tuple[Painter, dict[str, Painter]]:
+    net, _ = read_fill(fill_path(fill))
+    known = painters(data, net, ("train",))
+    return known, {split: painters(data, net, (split,), 16) for split in HELD_OUT}
+
+
+def _draw(painter: Painter, count: int, generator: torch.Generator) -> Sides:
+    rows = torch.randint(len(painter), (count,), generator=generator).numpy()
+    return painter.sides(rows, 1 + torch.randint(3, (count,), generator=generator).numpy())
+
+
+def _heads(sides: Sides) -> Tensor:
+    """(N, 9, 64, 64) painted, truth, texture coordinates and mask of the heads; nothing where there is none."""
+    stack = torch.cat([sides.painted, sides.truth, sides.uv], dim=1)
+    crops = []
+    for row, picture in enumerate(stack):
+        head = sides.labels[row] == PART["head"]
+        grid = head_window(head)
+        if grid is None:
+            grid = torch.full((1, 64, 64, 2), 2.0)
+        whole = torch.cat([picture, head[None].float()])[None]
+        crops.append(functional.grid_sample(whole, grid, mode="bilinear", padding_mode="zeros", align_corners=False))
+    return torch.cat(crops)
+
+
+def _turned(disc: Tensor, angle: float) -> Tensor:
+    """Colours with another hue: paper §4.4 varies it too."""
+    x, y, value = disc.unbind(dim=1)
+    cos, sin = math.cos(angle), math.sin(angle)
+    return torch.stack([cos * x - sin * y, sin * x + cos * y, value], dim=1)
+
+
+def _run(
+    net: nn.Module,
+    step: Callable[[nn.Module, torch.Generator, float], Mapping[str, Tensor]],
+    validate: Callable[[], Scores],
+    data: Path,
+    out: Path,
+    budget_min: float | None,
+    steps: int | None,
+    seed: int,
+    batch: int,
+) -> Result:
+    optimizer = torch.optim.AdamW(net.parameters(), RATE, weight_decay=1e-4)
+    return run_loop(
+        model=net,
+        optimizer=optimizer,
+        step=step,
+        validate=validate,
+        folder=out,
+        budget_min=budget_min,
+        steps=steps,
+        seed=seed,
+        batch=batch,
+        warmup=100,
+        clip=1.0,
+        amp=True,
+        validations=5,
+        arguments={"data": recipe_digest(data)},
+    )
+
+
+def _facts(data: Path, bodies: int, seed: int, result: Result, found: Scores, out: Path) -> dict[str, object]:
+    write_scores(out, found)
+    return {
+        "data": recipe_digest(data),
+        "bodies": bodies,
+        "seed": seed,
+        "steps": result.steps,
+        "samples": result.samples,
+        "scores": found,
+    }

@@ -1,0 +1,1 @@
+"""Samples and shards of training data, and loading them."""

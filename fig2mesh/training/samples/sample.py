@@ -1,0 +1,162 @@
+"""Ground truth of one subject from four sides: part solids, signed distances, masks, joints and pictures."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fig2mesh.field.camera import VIEW_YAW_DEG, axes
+from fig2mesh.records import BODY_PARTS, PART
+from fig2mesh.skeleton import part_centre
+from fig2mesh.training.bodies.partition import PartTopology
+from fig2mesh.training.bodies.subject import Subject
+from fig2mesh.training.drawing.raster import Raster, coverage, rasterise
+from fig2mesh.training.samples.sdf import signed_distance
+
+VIEWS: tuple[NDArray[np.float64], ...] = tuple(axes(yaw) for yaw in VIEW_YAW_DEG.values())
+"""The four sides of paper §3: p_view = VIEWS[k] @ p."""
+
+POINTS = 2000
+"""Inside and as many outside points a part (paper §4.2)."""
+
+MASK = 64
+GRID = 64
+SCENE = 448
+"""Pixels a side of the picture in which is decided what hides what."""
+
+MARGIN = 1.1
+"""Edge of a part's cube relative to the smallest that holds it."""
+
+NEAR = (0.02, 0.06)
+"""Spread of the points that are taken around the surface, PART units: the fine and the coarse half of them."""
+
+
+def geometry(subject: Subject, rng: np.random.Generator, *, grids: bool = False) -> dict[str, NDArray[Any]]:
+    """The arrays of a shard (docs/training.md) for one subject, without the pictures."""
+    centre, edge, size = np.zeros((14, 3)), np.ones(14), np.zeros((14, 3))
+    points, distance = np.zeros((14, 2 * POINTS, 3), np.float16), np.zeros((14, 2 * POINTS), np.float16)
+    amodal = np.zeros((4, 14, MASK, MASK), bool)
+    grid = np.zeros((14, GRID, GRID, GRID), np.float16) if grids else None
+    for part in subject.parts:
+        row = part.part - 1
+        vertices, faces = part.solid(subject.vertices)
+        centre[row] = part_centre(part.part, subject.joints)
+        edge[row] = 2.0 * MARGIN * np.abs(vertices - centre[row]).max()
+        size[row] = np.ptp(vertices, axis=0)
+        local = 2.0 * (vertices - centre[row]) / edge[row]
+        points[row], distance[row] = _sample(local, faces, rng)
+        if grid is not None:
+            grid[row] = _dense(local, faces)
+        amodal[:, row] = _amodal(local, subject.rig.faces[subject.rig.face_part == part.part], part, faces)
+    visible = _visible(subject, centre, edge)
+    arrays: dict[str, NDArray[Any]] = {
+        "joints": subject.joints.astype(np.float32),
+        "centre": centre.astype(np.float32),
+        "edge": edge.astype(np.float32),
+        "size": size.astype(np.float32),
+        "points": points,
+        "distance": distance,
+        "mask_amodal": np.packbits(amodal, axis=-1),
+        "mask_visible": np.packbits(visible & amodal, axis=-1),
+    }
+    return arrays if grid is None else {**arrays, "grid": grid}
+
+
+def _sample(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], rng: np.random.Generator
+) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
+    """As many points inside as outside: over the cube, over the part's box, and near the surface."""
+    corner = vertices[faces]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    chosen = corner[rng.choice(len(faces), 4000, p=area / area.sum())]
+    weight = rng.dirichlet((1.0, 1.0, 1.0), len(chosen))
+    near = np.einsum("nk,nkc->nc", weight, chosen)
+    near += rng.normal(size=near.shape) * np.repeat(NEAR, len(near) // 2)[:, None]
+    box = rng.uniform(vertices.min(axis=0), vertices.max(axis=0), (3000, 3))
+    everywhere = rng.uniform(-1.0, 1.0, (1500, 3))
+    # What is stored in half precision is what the distance is measured at.
+    query = np.clip(np.concatenate([near, box, everywhere]), -1.0, 1.0).astype(np.float16)
+    found = signed_distance(vertices, faces, query.astype(np.float32))
+    inside, outside = np.flatnonzero(found < 0), np.flatnonzero(found >= 0)
+    rows = np.concatenate([_choose(inside, rng), _choose(outside, rng)])
+    return query[rows], found[rows].astype(np.float16)
+
+
+def _choose(rows: NDArray[np.integer], rng: np.random.Generator) -> NDArray[np.integer]:
+    if not len(rows):
+        raise ValueError("a part without inside or outside: its mesh is not closed")
+    return rng.choice(rows, POINTS, replace=len(rows) < POINTS)
+
+
+def _dense(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float16]:
+    axis = np.linspace(-1.0, 1.0, GRID)
+    nodes = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    return signed_distance(vertices, faces, nodes).reshape(GRID, GRID, GRID).astype(np.float16)
+
+
+def _amodal(
+    vertices: NDArray[np.float64], own: NDArray[np.int32], part: PartTopology, faces: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """(4, 64, 64) the whole part from the four sides; front and back, left and right are mirror images.
+
+    Only the part's own faces count, not the rings by which it reaches into its neighbours: a drawing's regions meet.
+    """
+    _, inverse = np.unique(part.faces, return_inverse=True)
+    lookup = np.full(int(part.faces.max()) + 1, -1)
+    lookup[part.faces.ravel()] = inverse.ravel()
+    seen = [coverage(vertices @ VIEWS[k].T, lookup[own], size=MASK, low=(-1.0, -1.0), pitch=2.0 / MASK) for k in (0, 1)]
+    # Own faces are an open tube, and along its axis one looks through; drawn regions have no such holes.
+    seen = [filled(mask) for mask in seen]
+    return np.stack([seen[0], seen[1], seen[0][:, ::-1], seen[1][:, ::-1]])
+
+
+def filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(H, W) bool: a mask without holes; what cannot be reached from the border by sides of pixels is inside."""
+    outside = np.zeros(tuple(length + 2 for length in mask.shape), bool)
+    outside[0] = outside[-1] = outside[:, 0] = outside[:, -1] = True
+    free = np.pad(~mask, 1, constant_values=True)
+    while True:
+        grown = outside.copy()
+        grown[1:] |= outside[:-1]
+        grown[:-1] |= outside[1:]
+        grown[:, 1:] |= outside[:, :-1]
+        grown[:, :-1] |= outside[:, 1:]
+        grown &= free
+        if (grown == outside).all():
+            return ~outside[1:-1, 1:-1]
+        outside = grown
+
+
+def scene(
+    subject: Subject, view: int, size: int = SCENE
+) -> tuple[Raster, NDArray[np.uint8], NDArray[np.float64], float]:
+    """What is seen from one side: the raster of body and skirt, part labels, lower left corner and pixel's edge."""
+    body = subject.vertices @ VIEWS[view].T
+    skirt = subject.skirt_vertices @ VIEWS[view].T
+    vertices = np.concatenate([body, skirt])
+    faces = np.concatenate([subject.rig.faces, subject.skirt_faces + len(body)])
+    label = np.concatenate([subject.rig.face_part, np.full(len(subject.skirt_faces), PART["garment"], np.uint8)])
+    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
+    pitch = float((high - low).max()) / (0.9 * size)
+    corner = (low + high) / 2 - pitch * size / 2
+    raster = rasterise(vertices, faces, size=size, low=corner, pitch=pitch)
+    return raster, raster.pick(label), corner, pitch
+
+
+def _visible(subject: Subject, centre: NDArray[np.float64], edge: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(4, 14, 64, 64) where the drawing shows each part, in the part's own square."""
+    step = (np.arange(MASK) + 0.5) / MASK * 2.0 - 1.0
+    result = np.zeros((4, 14, MASK, MASK), bool)
+    for view, turn in enumerate(VIEWS):
+        _, labels, corner, pitch = scene(subject, view)
+        middle = centre @ turn.T
+        for part in BODY_PARTS:
+            half = edge[part - 1] / 2
+            column = (middle[part - 1, 0] + half * step - corner[0]) / pitch
+            row = SCENE - (middle[part - 1, 1] - half * step - corner[1]) / pitch
+            inside = ((row >= 0) & (row < SCENE))[:, None] & ((column >= 0) & (column < SCENE))[None]
+            rows, columns = (np.clip(v.astype(int), 0, SCENE - 1) for v in (row, column))
+            result[view, part - 1] = (labels[np.ix_(rows, columns)] == part) & inside
+    return result

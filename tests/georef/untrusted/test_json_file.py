@@ -1,0 +1,106 @@
+"""JSON from elsewhere: what is let through is what arithmetic, recursion and writing can use."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from georef.errors import MOST_CHARACTERS, InputError, PlacementError, one_line
+from georef.untrusted.json_file import MAX_DEPTH, parse_json, read_json
+
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**64), 2**64)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(st.characters(exclude_categories=["Cs"])),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(st.characters(exclude_categories=["Cs"])), inner),
+    max_leaves=20,
+)
+
+
+@given(VALUES, st.booleans(), st.sampled_from(["utf-8", "utf-8-sig", "utf-16", "utf-32"]))
+def test_every_document_comes_back(value: Any, ascii_only: bool, coding: str) -> None:
+    assert parse_json(json.dumps(value, ensure_ascii=ascii_only).encode(coding)) == value
+
+
+@given(st.text(alphabet='[]{}":,\\ 1a\u00e9\n', max_size=60))
+def test_brackets_in_texts_are_not_counted(text: str) -> None:
+    deep = "[" * MAX_DEPTH + json.dumps(text) + "]" * MAX_DEPTH
+    assert json.dumps(parse_json(deep)).replace(" ", "") == deep.replace(" ", "") or " " in text
+    with pytest.raises(ValueError, match="nested too deeply"):
+        parse_json(f"[{deep}]")
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_a_document_or_a_value_error_in_one_line(data: bytes) -> None:
+    said = ""
+    try:
+        parse_json(data)
+    except ValueError as error:
+        said = str(error)
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("text", "finding"),
+    [
+        ("[NaN]", "NaN is no number"),
+        ("-Infinity", "-Infinity is no number"),
+        ("[1e999]", "larger than any float64"),
+        ("1" + "0" * 5000, "larger than 2\\^64"),
+        ('{"a": 1, "b": {"a": 1}, "a": 2}', "'a' twice"),
+        ('["\\ud800"]', "half of a surrogate pair"),
+        ("[" * 100_000, "nested too deeply"),
+        ('{"a":[' * 100_000, "nested too deeply"),
+        ("", "not JSON: Expecting value at line 1, column 1"),
+        (b"\xff\xff\xff", "no UTF-8 text"),
+        (b"\xff\xfe\x00", "no UTF-16 text"),
+    ],
+)
+def test_what_is_ruled_out(text: str | bytes, finding: str) -> None:
+    with pytest.raises(ValueError, match=finding):
+        parse_json(text)
+
+
+def test_pairs_of_surrogates_are_characters() -> None:
+    assert parse_json('"\\ud83d\\ude00"') == "\U0001f600"
+    assert math.copysign(1, parse_json("-0.0")) == -1
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    (tmp_path / "round").symlink_to(tmp_path / "round")
+    (tmp_path / "large").write_bytes(b" " * 101)
+    for name, finding in {
+        "pipe": "no plain file",
+        "zero": "no plain file",
+        "": "a folder",
+        "gone": "No such file",
+        "round": "levels",
+        "large": "more than the 0 MB",
+    }.items():
+        with pytest.raises(PlacementError, match=finding) as caught:
+            read_json(tmp_path / name, "give another", PlacementError, max_bytes=100)
+        assert str(caught.value).endswith("; give another")
+
+
+@given(st.text(max_size=3000))
+def test_messages_are_one_line_that_a_terminal_only_shows(text: str) -> None:
+    shown = str(InputError(text, text, text))
+    assert shown.isprintable()
+    assert len(shown) <= 3 * (MOST_CHARACTERS + 3)
+    shown.encode()  # half surrogates, as names of files that are no Unicode have, are gone
+
+
+def test_paths_and_plain_texts_stay_as_they_are() -> None:
+    assert one_line("C:\\a  b\\ä.png: 3×4 px") == "C:\\a  b\\ä.png: 3×4 px"
+    assert one_line("a\n\tb\x1b[2J") == "a b\ufffd[2J"
