@@ -43,6 +43,10 @@ test check: export PYTHONDONTWRITEBYTECODE :=
 # One thread of torch a process: those of several processes wait for each other, and small networks gain nothing.
 test check: export OMP_NUM_THREADS := 1
 
+# Short tests try properties with the same examples on every machine, long ones with others each time; the first line
+# of pytest says their seed, and HYPOTHESIS_SEED=… draws them again.
+test check: export HYPOTHESIS_PROFILE := $(if $(SLOW)$(HYPOTHESIS_SEED),random,fixed)
+
 test: setup
 	$(TEST)
 

@@ -1,6 +1,6 @@
 """Place the three people of a pictorial map where it shows them, as tall on the globe as they are drawn on the map.
 
-python examples/place_three_from_map.py [OUT]
+python examples/place_three_from_map.py [OUT [QUALITY]]
 
 A collection of three rows: figures.csv says where on the map the feet are, the map's world file where its pixels are on
 the earth. A collection of thousands is converted by the same command. To see the three stand on their map:
@@ -33,8 +33,6 @@ def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("u
         quality,
         "--credit",
         "fig2mesh authors, MIT",
-        "--visible-from",
-        500_000,
         "--title",
         "Around Lake Zürich",
         *(word for suffix in formats for word in ("--format", suffix)),
@@ -46,5 +44,5 @@ def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("u
 
 
 if __name__ == "__main__":
-    for path in run(Path(sys.argv[1] if len(sys.argv) > 1 else "build/map")):
+    for path in run(Path(sys.argv[1] if len(sys.argv) > 1 else "build/map"), *sys.argv[2:3]):
         print(path)

@@ -20,6 +20,8 @@ from georef.placement import GeoPlacement
 
 Vector = tuple[float, float, float]
 Value = str | int | float | bool | None
+"""Of an attribute; whole numbers are of 64 bits."""
+
 Attributes = tuple[tuple[str, Value], ...]
 
 
@@ -64,7 +66,8 @@ class PlacedFigure:
 def plain_attributes(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> Attributes:
     """Names and values as every index can hold them: text, whole number, number, yes or no, or None.
 
-    NumPy's scalars become Python's. A number that is not finite becomes None, as tables write missing numbers as NaN
+    NumPy's scalars become Python's. Whole numbers beyond 64 bits with a sign become text: SQLite has none, and GDAL
+    opens no GeoJSON with one. A number that is not finite becomes None, as tables write missing numbers as NaN
     and JSON has neither. Of text goes what UTF-8 (halves of surrogate pairs) or SQLite (NUL) cannot hold.
 
     Raises ValueError for a value of another type.
@@ -74,14 +77,15 @@ def plain_attributes(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> At
 
 
 def _plain(name: str, value: Any) -> Value:
-    if value is None or type(value) in (bool, int):
-        return value  # type: ignore[no-any-return]
+    if value is None or type(value) is bool:
+        return value
     if isinstance(value, str):
         return _plain_text(value)
     if isinstance(value, np.bool_):
         return bool(value)
     if isinstance(value, Integral):
-        return int(value)
+        whole = int(value)
+        return whole if -(2**63) <= whole < 2**63 else str(whole)
     if isinstance(value, Real):
         return float(value) if math.isfinite(value) else None
     raise ValueError(f"attribute {name!r} is of type {type(value).__name__}")

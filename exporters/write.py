@@ -22,7 +22,7 @@ from exporters.gltf.glb import write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
 from exporters.profiles import GENERAL, Profile, suffix_of
-from exporters.tiles.tileset import DEFAULT_VISIBLE_FROM_M, TilesVersion, content_name, write_tileset
+from exporters.tiles.tileset import TilesVersion, content_name, write_tileset
 from exporters.usd.stage import texture_name, write_usd
 
 OutputPath = str | os.PathLike[str]
@@ -132,7 +132,7 @@ def write(
     asset: Asset,
     path: OutputPath,
     overwrite: bool = False,
-    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    visible_from_m: float | None = None,
     tiles_version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
 ) -> tuple[Path, ...]:

@@ -52,7 +52,7 @@ def write_geopackage(
 
     Coordinates are longitude, latitude and height above the ellipsoid, EPSG:4979. A figure that stands on whatever
     terrain there is has a point of two coordinates, as in GeoJSON; a layer of nothing but such is of EPSG:4326.
-    Columns are yes or no, whole numbers, numbers or text, whatever holds all their values, see
+    Columns are yes or no, whole numbers, numbers or text, whatever holds all their values exactly, see
     `exporters.gis.table_spool.TableSpool`. Text is written as it is, also where it begins with =, +, - or @: a database
     computes nothing. Take care when it is exported to a spreadsheet.
 

@@ -30,9 +30,11 @@ Rows = list[tuple[Any, dict[str, Value]]]
 class TableSpool:
     """Rows in order, kept in chunks on the disk, and what the columns of all of them are.
 
-    columns : name → kind, in the order in which names are met. A column that holds numbers and text is text, one of
-        nothing but None too, and whole numbers beyond 64 bits are text. Names that differ only in capital and small
-        letters are one column, as in SQL; the first spelling counts
+    columns : name → kind, in the order in which names are met; the least kind that holds every value exactly. A
+        column that holds numbers and text is text, one of nothing but None too. So is one of floats and a whole number
+        that float64 would round, as 2^53 + 1; without floats it is one of whole numbers, whatever gaps it has. Beside
+        numbers yes and no are 1 and 0. Names that differ only in capital and small letters are one column, as in SQL;
+        the first spelling counts
     """
 
     def __init__(self, folder: Path, columns: Mapping[str, type] | None = None) -> None:
@@ -41,6 +43,8 @@ class TableSpool:
         self.rows = 0
         self._kinds: dict[str, int] = {name: KINDS.index(kind) for name, kind in (columns or {}).items()}
         self._fixed = frozenset(self._kinds)
+        self._rounded: set[str] = set()
+        """Columns with a whole number that float64 does not hold; Python compares the two without rounding."""
         self._columns: dict[str, str] = {}
         self._spellings = {name.casefold(): name for name in self._kinds}
         self._chunk: Rows = []
@@ -57,7 +61,12 @@ class TableSpool:
     @property
     def columns(self) -> dict[str, type]:
         """See the class."""
-        return {name: str if kind < 0 else KINDS[kind] for name, kind in self._kinds.items()}
+        return {name: self._column_kind(name, kind) for name, kind in self._kinds.items()}
+
+    def _column_kind(self, name: str, kind: int) -> type:
+        if kind < 0 or (KINDS[kind] is float and name in self._rounded):
+            return str
+        return KINDS[kind]
 
     def add(self, key: Any, values: Mapping[str, Value]) -> None:
         """Append a row; key : whatever belongs to it beside the columns, such as its geometry."""
@@ -69,6 +78,8 @@ class TableSpool:
             row[column] = value
             if column not in self._fixed:
                 self._kinds[column] = max(self._kinds.get(column, -1), _kind(value))
+                if type(value) is int and float(value) != value:
+                    self._rounded.add(column)
         self._chunk.append((key, row))
         self.rows += 1
         if len(self._chunk) == CHUNK_ROWS:
@@ -90,17 +101,14 @@ class TableSpool:
 
 def _kind(value: Value) -> int:
     """Index in KINDS of the least kind of column that holds a value; -1 for None, which any holds."""
-    if value is None:
-        return -1
-    if isinstance(value, int) and not -(2**63) <= value < 2**63:
-        return KINDS.index(str)
-    return KINDS.index(type(value))
+    return -1 if value is None else KINDS.index(type(value))
 
 
 def column_arrays(values: list[Value], kind: type) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
     """Values of a column as an array, (N,) bool, int64, float64 or object of str, and where they are None.
 
-    The mask is None for text, which has its None in the array itself, and for a column without None.
+    The mask is None for text, which has its None in the array itself, and for a column without None. Numbers in a
+    column of text are as JSON writes them, which loses no digit.
     """
     if kind is str:
         text = [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]

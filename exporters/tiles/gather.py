@@ -20,7 +20,7 @@ from exporters.gis.geojson import write_collection
 from exporters.placed_figure import PlacedFigure
 from exporters.tiles.b3dm import b3dm_bytes
 from exporters.tiles.check import read_tileset
-from exporters.tiles.tileset import CONTENT_SUFFIXES, DEFAULT_VISIBLE_FROM_M, TilesVersion, check_distance, safe_name
+from exporters.tiles.tileset import CONTENT_SUFFIXES, TilesVersion, check_distance, safe_name
 from exporters.tiles.tree import tileset_documents
 from exporters.write import OutputPath, check_file, write_whole
 
@@ -33,9 +33,13 @@ LONGEST_NAME = 60
 
 @dataclass(frozen=True)
 class Written:
-    """What `write_figures` has written: number of figures, and the files, the tileset.json last."""
+    """What `write_figures` has written.
+
+    figures : their number; tallest_m : height of the tallest one; files : the tileset.json last
+    """
 
     figures: int
+    tallest_m: float
     files: tuple[Path, ...]
 
 
@@ -43,7 +47,7 @@ def write_figures(
     sources: Iterable[Path],
     folder: OutputPath,
     *,
-    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    visible_from_m: float | None = None,
     version: TilesVersion = "1.1",
     overwrite: bool = False,
     link: bool = False,
@@ -78,14 +82,15 @@ def write_figures(
         write_tree(figures, stage, visible_from_m=visible_from_m, version=version)
 
     outdated = list(_own_files(main)) if overwrite and main.is_file() else []
-    return Written(len(figures), write_whole(folder, main, fill, overwrite, outdated))
+    tallest_m = max(figure.placement.figure_height_m for figure in figures)
+    return Written(len(figures), tallest_m, write_whole(folder, main, fill, overwrite, outdated))
 
 
 def write_tree(
     figures: list[PlacedFigure],
     folder: Path,
     *,
-    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    visible_from_m: float | None = None,
     version: TilesVersion = "1.1",
     name: str = "tileset.json",
 ) -> None:

@@ -59,6 +59,15 @@ def figure_corners(placement: GeoPlacement, low: ArrayLike, high: ArrayLike) -> 
     return np.asarray(local @ matrix[:3, :3].T + matrix[:3, 3])
 
 
+def figure_box(placement: GeoPlacement, low: ArrayLike, high: ArrayLike) -> tuple[float, ...]:
+    """A figure's box with its margin, as 3D Tiles write boxes in ECEF; low, high : as for `figure_corners`."""
+    bottom, top = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+    matrix = ecef_matrix(placement)
+    centre = matrix[:3, :3] @ ((bottom + top) / 2) + matrix[:3, 3]
+    half_axes = matrix[:3, :3] * ((top - bottom) / 2 + 2 * BOX_MARGIN_M)
+    return tuple((np.concatenate([centre, half_axes.T.ravel()]) + 0.0).tolist())
+
+
 def place_tree(corners: Floats) -> PlaceNode:
     """The tree over figures.
 

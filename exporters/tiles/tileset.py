@@ -33,8 +33,8 @@ TilesVersion = Literal["1.0", "1.1"]
 CONTENT_SUFFIXES: dict[TilesVersion, str] = {"1.0": ".b3dm", "1.1": ".glb"}
 """What content is, by version of 3D Tiles."""
 
-DEFAULT_VISIBLE_FROM_M = 2000.0
-"""From how far away a figure is drawn unless asked otherwise, metres."""
+MIN_VISIBLE_HEIGHTS = 10.0
+"""Heights of a figure from which it should at least be drawn; with less, it vanishes while it is large on screen."""
 
 VISIBLE_RANGE_PER_ERROR = 1080 / (16 * 2 * math.tan(math.radians(30)) * 1080 / 1920)
 """103.9: metres of distance per metre of geometric error at which CesiumJS stops drawing a tileset.
@@ -60,7 +60,7 @@ def safe_name(name: str) -> str:
 def write_tileset(
     asset: Asset,
     path: Path | str,
-    visible_from_m: float = DEFAULT_VISIBLE_FROM_M,
+    visible_from_m: float | None = None,
     version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
 ) -> None:
@@ -68,7 +68,7 @@ def write_tileset(
 
     asset : a placed asset; `deviation_m` of its levels of detail becomes the tiles' geometric errors
     path : a folder, made if it is not there, or the tileset.json in one; files of the same names are replaced
-    visible_from_m : distance from which the figure is drawn at all, on a screen of 1080 rows
+    visible_from_m : distance from which the figure is drawn at all, on a screen of 1080 rows; None: `visible_range`
     version : of 3D Tiles
     profile : what the client of its content takes
 
@@ -90,13 +90,12 @@ def write_tileset(
     (folder / "tileset.json").write_bytes(text.encode() + b"\n")
 
 
-def tileset(
-    asset: Asset, visible_from_m: float = DEFAULT_VISIBLE_FROM_M, version: TilesVersion = "1.1"
-) -> dict[str, Any]:
+def tileset(asset: Asset, visible_from_m: float | None = None, version: TilesVersion = "1.1") -> dict[str, Any]:
     """The tileset.json of an asset; arguments and errors as for `write_tileset`."""
     check_distance(visible_from_m)
     root = root_tile(asset, version=version)
     assert asset.placement is not None  # root_tile has checked
+    height_m = asset.placement.figure_height_m
     properties: dict[str, Any] = {"name": {"type": "STRING", "required": True, "semantic": "NAME"}}
     values: dict[str, Any] = {"name": asset.name}
     if asset.copyright:
@@ -111,20 +110,42 @@ def tileset(
     return {
         "asset": {"version": version, "generator": "fig2mesh", "extras": extras},
         **(metadata if version == "1.1" else {"extras": values}),
-        "geometricError": visible_error(visible_from_m, root["geometricError"]),
+        "geometricError": visible_error(visible_from_m, height_m, root["geometricError"]),
         "root": root,
     }
 
 
-def check_distance(visible_from_m: float) -> None:
-    """Raise ExportError unless a distance to be seen from is one."""
-    if not (math.isfinite(visible_from_m) and visible_from_m > 0):
+def check_distance(visible_from_m: float | None) -> None:
+    """Raise ExportError unless a distance to be seen from is one, or None."""
+    if visible_from_m is not None and not (math.isfinite(visible_from_m) and visible_from_m > 0):
         raise ExportError("--visible-from", f"{visible_from_m:g} m", "give a positive distance in metres")
 
 
-def visible_error(visible_from_m: float, least: float) -> float:
-    """Geometric error, metres, of a tileset whose figures are drawn from that far; not below `least`, its root's."""
-    return max(visible_from_m / VISIBLE_RANGE_PER_ERROR, least)
+def visible_range(height_m: float) -> float:
+    """Distance, metres, from which a figure of a height is drawn unless asked otherwise: 2 km for one of 1.79 m.
+
+    From that many heights away a figure covers one and a half of 1080 rows.
+    """
+    return 2000.0 * (height_m / 1.79)
+
+
+def visible_error(visible_from_m: float | None, height_m: float, least: float) -> float:
+    """Geometric error, metres, of a tileset whose figure is drawn from that far; not below `least`, its root's.
+
+    visible_from_m : None takes `visible_range` of height_m
+    """
+    distance = visible_range(height_m) if visible_from_m is None else visible_from_m
+    return max(distance / VISIBLE_RANGE_PER_ERROR, least)
+
+
+def too_near_note(visible_from_m: float | None, tallest_m: float) -> str | None:
+    """A warning of one line where the distance is little for the height of the tallest figure, else None."""
+    if visible_from_m is None or visible_from_m >= MIN_VISIBLE_HEIGHTS * tallest_m:
+        return None
+    return (
+        f"--visible-from: from farther than {visible_from_m:g} m a figure {tallest_m:g} m tall is not drawn; "
+        f"without the option its range is {visible_range(tallest_m):.0f} m"
+    )
 
 
 def root_tile(asset: Asset, folder: str = "", version: TilesVersion = "1.1") -> dict[str, Any]:

@@ -2,11 +2,12 @@
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html
 
-Inner tiles have no content, only a box in ECEF round everything below. All of them have the geometric error of the
-whole tileset, whose range is the distance that figures are drawn from, and refine by ADD: then CesiumJS tests each
-child's own distance against the error of its parent, so a figure is drawn from just as far as if it had a tileset of
-its own, and what lies farther away is neither visited nor loaded. Larger errors higher up would gain nothing, since a
-box is never farther away than what it holds.
+Inner tiles have no content, only a box in ECEF round everything below. Their geometric error is the largest of those
+of the figures below, whose ranges are the distances that these are drawn from, and they refine by ADD: then CesiumJS
+tests each child's own distance against the error of its parent, and what lies farther away is neither visited nor
+loaded. A figure with a smaller range than others in its leaf has an inner tile of its own between, so that every figure
+is drawn from just as far as if it had a tileset of its own. Larger errors higher up would gain nothing, since a box is
+never farther away than what it holds.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from exporters.placed_figure import PlacedFigure
-from exporters.tiles.place_tree import PlaceNode, figure_corners, place_tree
+from exporters.tiles.place_tree import PlaceNode, figure_box, figure_corners, place_tree
 from exporters.tiles.tileset import TilesVersion, check_distance, figure_tile, visible_error
 
 FIGURES_PER_FILE = 512
@@ -86,7 +87,7 @@ def figure_properties(figure: PlacedFigure) -> dict[str, Any]:
 @dataclass(frozen=True)
 class _Writer:
     figures: Sequence[PlacedFigure]
-    error: float
+    errors: Sequence[float]
     version: TilesVersion
     stem: str
     digits: int
@@ -102,7 +103,7 @@ class _Writer:
             yield from self.documents(inner, file, numbers)
         asset = {"asset": {"version": self.version, "generator": "fig2mesh"}}
         schema = {"schema": SCHEMA} if self.version == "1.1" else {}
-        yield name, {**asset, **schema, "geometricError": self.error, "root": root}
+        yield name, {**asset, **schema, "geometricError": root["geometricError"], "root": root}
 
     def tile(
         self,
@@ -112,18 +113,28 @@ class _Writer:
         further: list[tuple[PlaceNode, str]],
         numbers: Iterator[int],
     ) -> dict[str, Any]:
-        tile: dict[str, Any] = {
-            "boundingVolume": {"box": list(node.box)},
-            "geometricError": self.error,
-            "refine": "ADD",
-        }
+        error = self.error(node)
+        tile = _inner_tile(node.box, error)
         if node is not top and node.count <= limit < top.count:
             file = f"{self.stem}_{next(numbers):0{self.digits}d}.json"
             further.append((node, file))
             return tile | {"content": {"uri": file}}
         inner = [self.tile(child, limit, top, further, numbers) for child in node.children]
-        leaves = [figure_tile(self.figures[index], self.facts(self.figures[index])) for index in node.figures]
-        return tile | {"children": inner + leaves}
+        return tile | {"children": inner + [self.leaf(index, error) for index in node.figures]}
+
+    def error(self, node: PlaceNode) -> float:
+        """Largest error of the figures below a node."""
+        below = [self.error(child) for child in node.children]
+        return max(below + [self.errors[index] for index in node.figures])
+
+    def leaf(self, index: int, above: float) -> dict[str, Any]:
+        """The tile of a figure; in one that shortens its range where the error above it is larger than its own."""
+        figure, error = self.figures[index], self.errors[index]
+        tile = figure_tile(figure, self.facts(figure))
+        if error >= above:
+            return tile
+        box = figure_box(figure.placement, figure.low, figure.high)
+        return _inner_tile(box, error) | {"children": [tile]}
 
     def facts(self, figure: PlacedFigure) -> dict[str, Any]:
         properties = figure_properties(figure)
@@ -133,9 +144,13 @@ class _Writer:
         return {"metadata": {"class": "figure", "properties": properties}}
 
 
+def _inner_tile(box: tuple[float, ...], error: float) -> dict[str, Any]:
+    return {"boundingVolume": {"box": list(box)}, "geometricError": error, "refine": "ADD"}
+
+
 def tileset_documents(
     figures: Sequence[PlacedFigure],
-    visible_from_m: float,
+    visible_from_m: float | None = None,
     version: TilesVersion = "1.1",
     name: str = "tileset.json",
 ) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -143,7 +158,8 @@ def tileset_documents(
 
     figures : at least one; `contents` as seen from the folder of the files. Their order decides the order of tiles
         only among figures at equal coordinates
-    visible_from_m : distance from which a figure is drawn at all, on a screen of 1080 rows
+    visible_from_m : distance from which a figure is drawn at all, on a screen of 1080 rows; None: of each figure,
+        `exporters.tiles.tileset.visible_range` of its height
     version : of 3D Tiles; 1.0 has no metadata, so its tiles tell the same in `extras`
     name : of the file to open; further ones are called after it
 
@@ -151,9 +167,9 @@ def tileset_documents(
     """
     check_distance(visible_from_m)
     tree = place_tree(np.array([figure_corners(each.placement, each.low, each.high) for each in figures]))
-    error = visible_error(visible_from_m, max(figure.errors[-1] for figure in figures))
+    errors = [visible_error(visible_from_m, each.placement.figure_height_m, each.errors[-1]) for each in figures]
     files = -(-len(figures) // FIGURES_PER_FILE)
-    writer = _Writer(figures, error, version, PurePosixPath(name).stem, len(str(2 * files)))
+    writer = _Writer(figures, errors, version, PurePosixPath(name).stem, len(str(2 * files)))
     facts = {"figures": len(figures)}
     metadata = {"class": "collection", "properties": facts}
     for file, document in writer.documents(tree, name, iter(range(1, 1 << 62))):

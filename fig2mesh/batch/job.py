@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+from exporters.gis.time_span import time_span
+from exporters.tiles.tileset import too_near_note
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.engine import Engine, Stage
 from fig2mesh.batch.ledger import WORK, Ledger
@@ -20,6 +22,7 @@ from fig2mesh.batch.progress import Kind, Tally, watching
 from fig2mesh.batch.row_files import Roots
 from fig2mesh.batch.row_job import LASTING
 from fig2mesh.batch.row_options import OWN_COLUMNS, known_columns
+from fig2mesh.batch.row_request import check_formats
 from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apart
 from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, read_spool, tasks_of, write_spool
@@ -46,7 +49,7 @@ def run(
     layer: str | None,
     unplaced: bool,
     title: str | None,
-    visible_from: float,
+    visible_from: float | None,
     overwrite: bool,
     quiet: bool,
     verbose: int,
@@ -58,7 +61,7 @@ def run(
 
     Returns the exit code: 0 all rows are done, 2 some are not because of their input, 1 because of us.
     """
-    from fig2mesh.convert.job import configure_logging
+    from fig2mesh.convert.job import check_visible_from, configure_logging
 
     configure_logging(quiet, verbose)
     if engine == "dask" and address is None:
@@ -67,8 +70,10 @@ def run(
         raise InputError("--address", "given without --engine dask", "pass --engine dask as well")
     if output is None and not dry_run:
         raise InputError("-o", "no folder for the outputs", "pass -o DIR")
-    if not 0 < visible_from < 1e9:
-        raise InputError("--visible-from", f"{visible_from:g} m", "give a distance in metres")
+    check_visible_from(visible_from)
+    check_formats(defaults.get("format", ()), "--format")
+    if "date" in defaults:
+        time_span(defaults["date"], "--date")
     if root is not None and not root.is_dir():
         raise InputError("--root", f"no folder {root}", "name a folder that holds the collection's files")
     base = Path(os.path.abspath(collection)).parent
@@ -111,6 +116,8 @@ def run(
             name = title or collection.stem
             summary = summarise_apart(Collection(folder, spool, columns, name, visible_from))
             _tell(folder, tally, summary)
+            if summary.figures and (note := too_near_note(visible_from, summary.tallest_m)):
+                log.warning("%s", note)
         return 0 if not tally.failed else 1 if tally.ours else 2
 
 

@@ -120,7 +120,9 @@ def options_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: s
     for column in values:
         if forbidden(column):
             raise InputError(f"column {column}", "is chosen by the batch", "remove the column")
-    merged = {**_without_other_place(defaults, values), **{c: v for c, v in values.items() if c in _options()}}
+    both = {**_without_other_place(defaults, values), **values}
+    # Of both, format and date are the batch's own: the main job has no such options.
+    merged = {column: value for column, value in both.items() if column in _options()}
     for option, pair in PAIRS.items():
         given = [values[column] for column in pair if column in values]
         if len(given) == 1:

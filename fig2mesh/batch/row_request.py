@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
 
 FORMATS = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
 """What a row may ask for; .glb is always made."""
+
+
+def check_formats(formats: Iterable[str], where: str) -> None:
+    """Raise InputError, about `where`, for a suffix that a row may not ask for."""
+    for each in formats:
+        if each.lower().lstrip(".") not in FORMATS:
+            raise InputError(where, each[:40] or "empty", f"choose from {', '.join(FORMATS)}; .glb is always made")
 
 
 class RowRequest:
@@ -40,9 +48,7 @@ class RowRequest:
             raise InputError(task.where, finding, remedy or "correct the row")
         self.batch, self.task = batch, task
         self.options: RowOptions = options_of(task.values, batch.defaults, task.title)
-        for each in self.options.formats:
-            if each.lower().lstrip(".") not in FORMATS:
-                raise InputError("column format", each[:40], f"choose from {', '.join(FORMATS)}; .glb is always made")
+        check_formats(self.options.formats, "column format")
         trusted = frozenset(
             parameter
             for column, parameter in (("mask", "mask"), ("map", "map_sheet"), ("altitude_datum", "altitude_datum"))

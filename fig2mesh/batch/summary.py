@@ -28,21 +28,23 @@ REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "notes")
 @dataclass(frozen=True)
 class Collection:
     """folder : of the outputs; spool : of the tasks; columns : of the user that the indexes carry, in order;
-    title : of the collection; visible_from_m : of the tileset."""
+    title : of the collection; visible_from_m : of the tileset, None: by the height of each figure."""
 
     folder: Path
     spool: Path
     columns: tuple[str, ...]
     title: str
-    visible_from_m: float
+    visible_from_m: float | None
 
 
 @dataclass(frozen=True)
 class Summary:
-    """figures : on the globe; unplaced : converted without a place; failed : rows; written : files, none if all were
-    there; left : names of figures that an earlier collection had."""
+    """figures : on the globe; tallest_m : height of the tallest of them, 0 without; unplaced : converted without a
+    place; failed : rows; written : files, none if all were there; left : names of figures that an earlier collection
+    had."""
 
     figures: int
+    tallest_m: float
     unplaced: int
     failed: int
     written: tuple[str, ...]
@@ -78,7 +80,8 @@ def summarise(collection: Collection) -> Summary:
         else:
             figures.append(_figure(record["figure"], collection.columns))
             dates.append(record["date"])
-    counts = (len(figures), unplaced, failed)
+    tallest_m = max((figure.placement.figure_height_m for figure in figures), default=0.0)
+    counts = (len(figures), tallest_m, unplaced, failed)
     before = _before(folder)
     if before["digest"] == digest.hexdigest() and stand(folder, before["files"]):
         return Summary(*counts, (), tuple(sorted(left)))

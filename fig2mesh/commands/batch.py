@@ -51,7 +51,12 @@ from fig2mesh.commands.options import FILE, messages
 @click.option("--unplaced", is_flag=True, help="Rows need no place on the earth.")
 @click.option("--date", metavar="DATE", help="Of rows that have none: 1893, 1893-05-17, 1893/1895; for the catalogue.")
 @click.option("--title", metavar="TEXT", help="Of the catalogue; default: COLLECTION's stem.")
-@click.option("--visible-from", type=float, default=2000.0, show_default=True, metavar="M", help="Of the tileset.")
+@click.option(
+    "--visible-from",
+    type=float,
+    metavar="M",
+    help="Distance from which figures of the tileset are drawn; default: about 1,100 times the height of each.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace files in DIR that are not of an earlier batch.")
 @messages
 @click.pass_context

@@ -24,7 +24,7 @@ def run(request: Request, quiet: bool = False) -> None:
     """Convert the figure of a request and write its outputs. Raises InputError."""
     from fig2mesh.convert.convert import convert
     from fig2mesh.convert.observer import Observer
-    from fig2mesh.convert.outputs import check_request, write_outputs
+    from fig2mesh.convert.outputs import check_request, near_note, write_outputs
     from fig2mesh.convert.place import clamp_note, log_place
     from fig2mesh.convert.text_file import write_text
     from fig2mesh.counters import counting
@@ -34,7 +34,7 @@ def run(request: Request, quiet: bool = False) -> None:
     with progress(quiet) as advance, counting() as counts:
         observer = Observer(advance)
         done = convert(request, observer=observer)
-        log_place(done.placed, clamp_note(request, request.targets))
+        log_place(done.placed, clamp_note(request, request.targets), near_note(request, done.placed.height_m))
         for note in done.notes:
             log.warning("%s: %s", request.figure, note)
         written = write_outputs(done.asset, request, observer)

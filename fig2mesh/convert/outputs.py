@@ -6,6 +6,7 @@ from pathlib import Path
 
 from exporters.asset import Asset
 from exporters.profiles import profile_named
+from exporters.tiles.tileset import too_near_note
 from exporters.write import check_outputs, in_order, is_tileset, needs_place, write
 from fig2mesh.convert.observer import Observer
 from fig2mesh.convert.request import Request
@@ -47,3 +48,8 @@ def write_outputs(asset: Asset, request: Request, observer: Observer) -> list[Pa
                 profile=profile_named(request.profile),
             )
     return written
+
+
+def near_note(request: Request, height_m: float) -> str | None:
+    """One line where a tileset is drawn from too near for a figure of that height, else None."""
+    return too_near_note(request.visible_from, height_m) if any(map(is_tileset, request.targets)) else None

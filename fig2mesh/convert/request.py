@@ -185,7 +185,12 @@ class OutputOptions:
         help="Write for one client: cesiumjs compressed (also with KTX 2 texture), blender and qgis without "
         "extensions, omniverse as binary USD. Default: what every client takes.",
     )
-    visible_from: float = option(default=2000.0, metavar="M", column=False, help="3D Tiles only.")
+    visible_from: float | None = option(
+        default=None,
+        metavar="M",
+        column=False,
+        help="Distance from which the figure is drawn, 3D Tiles only; default: about 1,100 times its height.",
+    )
     tiles_version: Literal["1.0", "1.1"] = option(
         default="1.1", column=False, help="Of 3D Tiles; 1.0: content as .b3dm, for older clients."
     )
@@ -210,8 +215,7 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
     def __post_init__(self) -> None:
         super().__post_init__()
         self._light()
-        if not 0 < self.visible_from < 1e9:
-            raise InputError("--visible-from", f"{self.visible_from:g} m", "give a distance in metres")
+        check_visible_from(self.visible_from)
 
     @property
     def targets(self) -> tuple[str, ...]:
@@ -234,6 +238,12 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
         if "none" in self.effects and others:
             raise InputError("--effect", f"none beside {others[0]}", "give either none or the effects wanted")
         return "light" in self.effects if self.effects else None
+
+
+def check_visible_from(distance_m: float | None) -> None:
+    """Refuse a distance to be seen from that is none. Raises InputError."""
+    if distance_m is not None and not 0 < distance_m < 1e9:
+        raise InputError("--visible-from", f"{distance_m:g} m", "give a distance in metres")
 
 
 def torch_device(name: str) -> str:

@@ -4,6 +4,8 @@
 const MOST_LISTED = 300;
 const PITCH = -8; // degrees; a little from above
 const AWAY = 3.2; // radii of a figure between it and the camera
+const CLEAR = 1.2; // radii at which the camera is still outside of it
+const DRAWN_PX = 16; // CesiumJS draws a figure while the geometric error above it covers more
 
 const find = (id) => document.getElementById(id);
 const make = (tag, text, more = {}) => Object.assign(document.createElement(tag), { textContent: text, ...more });
@@ -82,6 +84,22 @@ async function start() {
     viewer.terrainProvider = groundAt(height);
   }
 
+  // From how far away CesiumJS draws a figure, metres; without limit for what is no tileset.
+  function range(figure) {
+    if (figure.errorAbove === undefined) return Infinity;
+    return (figure.errorAbove * scene.drawingBufferHeight) / (DRAWN_PX * camera.frustum.sseDenominator);
+  }
+
+  function tooFar(figure) {
+    return figure.errorAbove !== undefined && figure.away(camera) >= range(figure);
+  }
+
+  // As far as shows all of a figure, nearer where it is drawn from less far only.
+  function awayFor(figure, radius) {
+    const nearer = 0.9 * range(figure);
+    return nearer > CLEAR * radius ? Math.min(AWAY * radius, nearer) : AWAY * radius;
+  }
+
   async function look(figure, seconds = matchMedia('(prefers-reduced-motion: reduce)').matches ? 0 : 2.5) {
     if (state.current && state.part !== null) choosePart(null);
     state.current = figure;
@@ -90,7 +108,7 @@ async function start() {
     const place = figure.place();
     const sphere = figure.sphere();
     const towards = Angle.toRadians((place?.heading_deg ?? 180) + 180);
-    const offset = new HeadingPitchRange(towards, Angle.toRadians(PITCH), AWAY * sphere.radius);
+    const offset = new HeadingPitchRange(towards, Angle.toRadians(PITCH), awayFor(figure, sphere.radius));
     find('scale').textContent = '';
     if (place) {
       const step = drawGrid(lines, place.feet, figure.size);
@@ -114,7 +132,7 @@ async function start() {
       let frames = 0;
       const wait = () => {
         const figure = asked.real ?? asked;
-        const waiting = figure.distant ||  figure.pending?.() || (figure.kind === 'tiles' && (!figure.drawn.tilesLoaded || figure.shownLevel() < 0));
+        const waiting = !tooFar(figure) && (figure.distant || figure.pending?.() || (figure.kind === 'tiles' && (!figure.drawn.tilesLoaded || figure.shownLevel() < 0)));
         if ((!waiting && frames > 1) || ++frames > 600) { remove(); done(); } else scene.requestRender();
       };
       const remove = scene.postRender.addEventListener(wait);
@@ -181,6 +199,16 @@ async function start() {
     const error = found?.error ? `at most ${(1000 * found.error).toPrecision(3)} mm off` : 'the finest mesh';
     const text = found ? `shown: LOD ${level}, ${error}${triangles}` : '';
     if (find('level').textContent !== text) find('level').textContent = text;
+  }
+
+  function showRange() {
+    const figure = state.current;
+    const note = find('range');
+    note.hidden = !figure || !tooFar(figure);
+    if (note.hidden) return;
+    const metres = range(figure);
+    const text = `not drawn from here: closer than ${metres >= 1000 ? `${Number((metres / 1000).toPrecision(2))} km` : `${Number(metres.toPrecision(2))} m`}`;
+    if (note.textContent !== text) note.textContent = text;
   }
 
   function setLevel(level) {
@@ -281,6 +309,7 @@ async function start() {
   find('grid').addEventListener('change', (event) => setGrid(event.target.checked));
   find('filter').addEventListener('input', list);
   scene.postRender.addEventListener(showLevel);
+  scene.postRender.addEventListener(showRange);
   scene.renderError.addEventListener((_, error) => fail(error));
 
   figures.forEach(label);

@@ -88,17 +88,27 @@ function saidOf(header, given) {
 
 const ecefFromContent = (transform) => Cesium.Matrix4.multiply(transform, Cesium.Axis.Y_UP_TO_Z_UP, new Cesium.Matrix4());
 
+// Smallest geometric error above a figure: where it covers too little of the screen, CesiumJS draws nothing of it.
+// It always looks into further files, whatever the error of the tile that names them.
+function errorAbove(tile, tileset) {
+  const errors = [tileset._geometricError];
+  for (let above = tile.parent; above; above = above.parent) if (!above.hasTilesetContent) errors.push(above.geometricError);
+  return Math.min(...errors);
+}
+
+const awayFrom = (sphere, camera) => Math.max(0, Cesium.Cartesian3.distance(camera.positionWC, sphere.center) - sphere.radius);
+
 // Figures in files that CesiumJS has not opened yet, as it opens those that the camera is near: to be listed and flown to.
-async function distantFigures(url, given, transform, opened, found = []) {
+async function distantFigures(url, given, transform, opened, above = Infinity, found = []) {
   const { BoundingSphere, Cartesian3, Matrix3, Matrix4, OrientedBoundingBox } = Cesium;
-  const { root } = await (await fetch(url)).json();
-  const pending = [{ header: root, above: transform }];
+  const { root, geometricError } = await (await fetch(url)).json();
+  const pending = [{ header: root, frame: transform, errorAbove: Math.min(above, opened ? geometricError : Infinity) }];
   while (pending.length) {
-    const { header, above } = pending.pop();
-    const matrix = header.transform ? Matrix4.multiply(above, Matrix4.unpack(header.transform), new Matrix4()) : above;
+    const { header, frame, errorAbove } = pending.pop();
+    const matrix = header.transform ? Matrix4.multiply(frame, Matrix4.unpack(header.transform), new Matrix4()) : frame;
     const uri = uriOf(header);
     if (uri && isTileset(uri)) {
-      await distantFigures(new URL(uri, new URL(url, location.href)).href, given, matrix, false, found);
+      await distantFigures(new URL(uri, new URL(url, location.href)).href, given, matrix, false, errorAbove, found);
     } else if (uri) {
       const { box } = header.boundingVolume;
       if (opened || !box) continue;
@@ -108,13 +118,13 @@ async function distantFigures(url, given, transform, opened, found = []) {
       const place = placeOf(ecefFromContent(matrix));
       const { tall, ...said } = saidOf(header, given);
       found.push({
-        kind: 'tiles', ...said, distant: true, drawn: null, sphere: () => BoundingSphere.clone(sphere), place: () => place,
+        kind: 'tiles', ...said, distant: true, drawn: null, errorAbove, away: (camera) => awayFrom(sphere, camera), sphere: () => BoundingSphere.clone(sphere), place: () => place,
         ground: place ? place.height_m : 0, size: tall ?? 2 * sphere.radius, models: () => [], features: () => [], levels: [],
         shownLevel: () => -1, owns: () => false, show: () => {},
       });
       continue;
     }
-    pending.push(...(header.children ?? []).map((child) => ({ header: child, above: matrix })).reverse());
+    pending.push(...(header.children ?? []).map((child) => ({ header: child, frame: matrix, errorAbove: Math.min(errorAbove, header.geometricError) })).reverse());
   }
   return found;
 }
@@ -137,7 +147,8 @@ async function loadTileset(viewer, given) {
     const up = volume?.halfAxes ? 2 * Cartesian3.magnitude(Matrix3.getColumn(volume.halfAxes, 2, new Cartesian3())) : undefined;
     const place = placeOf(ecefFromContent(tile.computedTransform));
     return {
-      kind: 'tiles', ...said, drawn: tileset, tile,
+      kind: 'tiles', ...said, drawn: tileset, tile, errorAbove: errorAbove(tile, tileset),
+      away: () => tile.distanceToTile(viewer.scene.frameState),
       sphere: () => BoundingSphere.clone(tile.boundingSphere), place: () => place, ground: place ? place.height_m : 0,
       size: tall ?? up ?? 2 * tile.boundingSphere.radius,
       models: () => chain.map((each) => each.content?._model).filter(Boolean),

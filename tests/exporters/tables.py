@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from hypothesis import strategies as st
 
 from exporters.placed_figure import PlacedFigure, plain_attributes
+from fig2mesh.batch.collections.rows import MAX_INTEGER
 from georef.placement import GeoPlacement
 from tests.georef.strategies import headings, heights, latitudes, longitudes
 
@@ -14,7 +15,16 @@ text = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0")
 awkward_text = st.one_of(
     st.text(max_size=12), st.sampled_from(["", "=1+1", "+41", "-5", "@sum", "NULL", "1893", "true", "1e5", "Ä\n\t'\""])
 )
-values = st.one_of(st.none(), st.booleans(), st.integers(), st.integers(-(2**63), 2**63 - 1), st.floats(), awkward_text)
+borders = st.sampled_from([0, 2**53, 2**63, MAX_INTEGER])
+# fmt: off
+whole_numbers = st.builds(
+    lambda border, step, sign: sign * min(border + step, MAX_INTEGER),
+    borders, st.integers(-3, 3), st.sampled_from([1, -1]),
+)
+# fmt: on
+values = st.one_of(
+    st.none(), st.booleans(), st.integers(), whole_numbers, st.integers(-(2**63), 2**63 - 1), st.floats(), awkward_text
+)
 column_names = st.one_of(
     st.sampled_from(["artist", "Year", "year", "fid", "geom", "name", "NAME", "name_2", "model", "rowid", "title", ""]),
     st.text(max_size=8),

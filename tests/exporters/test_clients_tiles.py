@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from exporters.asset import Asset
 from exporters.gltf.part_borders import split_at_parts
+from exporters.placed_figure import PlacedFigure
 from exporters.tiles.gather import write_figures
 from exporters.tiles.tileset import write_tileset
 from exporters.tiles.tree import tileset_documents
 from exporters.write import write
+from fig2mesh.globe.assets import find_assets
+from fig2mesh.globe.page import globe_page, page_files
+from fig2mesh.view.server import page_server
 from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.placement import GeoPlacement
 from tests import py3dtiles
-from tests.exporters.analytic import ZURICH, asset, capsule
+from tests.browser import Look, serving
+from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule
 from tests.exporters.test_clients import HEADINGS, PLACES
-from tests.exporters.tiles.test_tree import HIGH, LOW, crowd
+from tests.exporters.tiles.test_tree import crowd, mixed
 from tests.node import RunScript
 
 SMALL = (capsule(8, 2),)
@@ -34,10 +42,10 @@ def four(tmp_path: Path) -> Path:
     return tmp_path / "in"
 
 
-def _distance(points: np.ndarray, place: GeoPlacement) -> float:
+def _distance(points: np.ndarray, figure: PlacedFigure) -> float:
     """From the nearest of points, ECEF, to a figure's box with its millimetre."""
-    local = ecef_from_tile(place).inverse().apply(points)
-    gap = np.maximum(np.maximum(np.array(LOW) - 1e-3 - local, local - np.array(HIGH) - 1e-3), 0)
+    local = ecef_from_tile(figure.placement).inverse().apply(points)
+    gap = np.maximum(np.maximum(np.array(figure.low) - 1e-3 - local, local - np.array(figure.high) - 1e-3), 0)
     return float(np.linalg.norm(gap, axis=-1).min())
 
 
@@ -63,13 +71,105 @@ def test_cesium_draws_just_the_figures_within_the_distance(
     found = node("visible.mjs", stdin={"tileset": str(tmp_path / "tileset.json"), "views": views})["views"]
     for view, seen in zip(views, found, strict=True):
         camera = ecef_from_geodetic([[view["lon_deg"], view["lat_deg"], view["height_m"]]])
-        away = {each.contents[0]: _distance(camera, each.placement) for each in figures}
+        away = {each.contents[0]: _distance(camera, each) for each in figures}
         # Drawn from where 16 pixels are one of 1080 rows at 60 degrees across, to float32's digits of nothing here.
         assert set(seen["drawn"]) == {uri for uri, distance in away.items() if distance < visible_from * (1 - 1e-9)}
     assert found[-1] == {"drawn": [], "files": 0, "visited": 0}
     assert found[-2]["drawn"]
     # Nor is the rest of the tree looked through: 700 figures, 101 nodes above them.
     assert all(seen["visited"] < 801 for seen in found)
+
+
+def test_cesium_draws_figures_of_any_heights_from_as_far_as_their_own(tmp_path: Path, node: RunScript) -> None:
+    figures = mixed(300, 0.05)
+    for name, document in tileset_documents(figures):
+        (tmp_path / name).write_text(json.dumps(document))
+    ranges = {each.contents[0]: 2000 / 1.79 * each.placement.figure_height_m for each in figures}
+    first = {
+        height: next(each for each in figures if each.placement.figure_height_m == height)
+        for height in (1.79, 180.0, 6186.2)
+    }
+    # Above one figure of each height, within the range of that height and beyond it.
+    views = [
+        {
+            "lon_deg": each.placement.lon_deg,
+            "lat_deg": each.placement.lat_deg,
+            "height_m": each.placement.height_m + each.high[2] + share * ranges[each.contents[0]],
+        }
+        for each in first.values()
+        for share in (0.01, 0.5, 0.99, 1.01)
+    ]
+    found = node("visible.mjs", stdin={"tileset": str(tmp_path / "tileset.json"), "views": views})["views"]
+    for view, seen in zip(views, found, strict=True):
+        camera = ecef_from_geodetic([[view["lon_deg"], view["lat_deg"], view["height_m"]]])
+        near = {each.contents[0] for each in figures if _distance(camera, each) < ranges[each.contents[0]]}
+        assert set(seen["drawn"]) == near
+    for number, each in enumerate(first.values()):
+        drawn = [each.contents[0] in seen["drawn"] for seen in found[4 * number : 4 * number + 4]]
+        assert drawn == [True, True, True, False]
+
+
+def tall(height_m: float, name: str) -> Asset:
+    """A figure as tall as that, as a map shows it."""
+    mesh = capsule(8, 2)
+    larger = replace(mesh, vertices=mesh.vertices * height_m / HEIGHT)
+    return asset(replace(ZURICH, figure_height_m=height_m), lods=(larger,), name=name)
+
+
+ZOOM = """(async () => {
+  const { viewer, figures } = fig2mesh;
+  fig2mesh.state.current = figures[0];
+  viewer.camera.lookAtTransform(Cesium.Matrix4.IDENTITY);
+  await viewer.zoomTo(figures[0].drawn);
+  for (let i = 0; i < 200 && !(i > 5 && figures[0].drawn.tilesLoaded); i++) {
+    await new Promise((done) => { viewer.scene.requestRender(); requestAnimationFrame(done); });
+  }
+  return [figures[0].shownLevel(), document.getElementById('range').hidden];
+})()"""
+
+AT = """(async () => {{
+  await fig2mesh.look(fig2mesh.figures[0], 0);
+  fig2mesh.viewer.camera.zoomOut({out});
+  for (let i = 0; i < 20; i++) {{
+    await new Promise((done) => {{ fig2mesh.viewer.scene.requestRender(); requestAnimationFrame(done); }});
+  }}
+  const note = document.getElementById('range');
+  return [fig2mesh.figures[0].shownLevel(), note.hidden ? null : note.textContent];
+}})()"""
+
+
+def _page(folder: Path, look: Look, cesium: Path, *scripts: str) -> list[Any]:
+    assets = find_assets((folder,))
+    with serving(page_server(globe_page(assets), 0, {"cesium": cesium}, page_files(assets))) as address:
+        found = look(address, *({"evaluate": script} for script in scripts), size=(480, 270))
+    assert found["messages"] == []
+    return [each["value"] for each in found["results"]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [1.79, 1800.0, 400_000.0])
+def test_a_figure_is_drawn_where_a_client_flies_to(tmp_path: Path, look: Look, cesium: Path, height: float) -> None:
+    write(tall(height, "giant"), tmp_path / "one")
+    write_figures([tmp_path / "one"], tmp_path / "all")
+    for folder in ("one", "all"):
+        zoomed, looked = _page(tmp_path / folder, look, cesium, ZOOM, AT.format(out=0))
+        assert zoomed == [0, True]
+        assert looked == [0, None]
+
+
+@pytest.mark.slow
+def test_the_globe_flies_into_a_short_range_or_says_that_nothing_is_drawn(
+    tmp_path: Path, look: Look, cesium: Path
+) -> None:
+    # A canvas of 270 rows has a quarter of the range.
+    write(tall(1800.0, "giant"), tmp_path / "short", visible_from_m=7000.0)
+    near, far = _page(tmp_path / "short", look, cesium, AT.format(out=0), AT.format(out=20_000))
+    assert near == [0, None]
+    assert far == [-1, "not drawn from here: closer than 1.8 km"]
+    write(tall(1800.0, "giant"), tmp_path / "shorter", visible_from_m=2000.0)
+    assert _page(tmp_path / "shorter", look, cesium, AT.format(out=0)) == [
+        [-1, "not drawn from here: closer than 500 m"]
+    ]
 
 
 def test_levels_of_detail_follow_their_errors_in_cesium(tmp_path: Path, node: RunScript) -> None:

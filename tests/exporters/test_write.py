@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-import exporters.write
 from exporters.errors import ExportError
 from exporters.write import FORMATS, check_outputs, write
 from georef.errors import InputError
@@ -165,4 +164,6 @@ def test_visible_from_reaches_the_tileset(tmp_path: Path) -> None:
     write(SMALL, near, visible_from_m=100)
     write(SMALL, far, visible_from_m=5000)
     assert (near / "tileset.json").read_bytes() != (far / "tileset.json").read_bytes()
-    assert exporters.write.DEFAULT_VISIBLE_FROM_M == 2000
+    write(SMALL, tmp_path / "usual")
+    write(SMALL, tmp_path / "two km", visible_from_m=2000.0)
+    assert (tmp_path / "usual" / "tileset.json").read_bytes() == (tmp_path / "two km" / "tileset.json").read_bytes()

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from exporters.figure_reader import describe
 from exporters.gis.geojson import OWN_PROPERTIES, feature, free_names
 from exporters.placed_figure import PlacedFigure, plain_attributes
+from fig2mesh.batch.collections.rows import MAX_INTEGER
 from tests.exporters.analytic import ZURICH
 from tests.exporters.tables import column_names, figure, tables, values
 
@@ -29,6 +30,8 @@ def test_values_are_plain_and_stay_so(pairs: list[tuple[str, object]]) -> None:
         assert "\0" not in name
         if isinstance(given_value, float) and not math.isfinite(given_value):
             assert value is None
+        elif type(given_value) is int and not -(2**63) <= given_value < 2**63:
+            assert value == str(given_value)
         elif not isinstance(given_value, str):
             assert value is given_value or (value == given_value and type(value) is type(given_value))
 
@@ -41,6 +44,11 @@ def test_values_are_plain_and_stay_so(pairs: list[tuple[str, object]]) -> None:
         (np.float32(0.5), 0.5),
         (np.bool_(True), True),
         (np.float64("nan"), None),
+        (np.uint64(2**63 - 1), 2**63 - 1),
+        (np.uint64(2**63), "9223372036854775808"),
+        (-(2**63), -(2**63)),
+        (-(2**63) - 1, "-9223372036854775809"),
+        (MAX_INTEGER, "18446744073709551616"),
         (np.str_("a"), "a"),
         (Fraction(1, 2), 0.5),
         ("a\0b", "ab"),

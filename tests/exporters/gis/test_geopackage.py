@@ -15,7 +15,8 @@ import numpy as np
 import pyogrio
 import pyproj
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 
 from exporters.errors import ExportError
 from exporters.gis import table_spool
@@ -24,7 +25,7 @@ from exporters.gis.geopackage import Failure, write_geopackage
 from exporters.placed_figure import PlacedFigure, ecef_matrix
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import ZURICH
-from tests.exporters.tables import figure, many, tables
+from tests.exporters.tables import figure, many, tables, whole_numbers
 
 CLAMPED = GeoPlacement(8.5, 47.4, 0.0, altitude_mode="clamp")
 
@@ -72,6 +73,46 @@ def test_all_is_as_in_geojson(tmp_path: Path, figures: list[PlacedFigure]) -> No
         assert list(row) == list(said["properties"])
         assert all(_same(row[name], value) for name, value in said["properties"].items())
     assert _coordinates(path) == [said["geometry"]["coordinates"] for said in features]
+
+
+def _is_stored(stored: Any, value: Any) -> bool:
+    """Whether a value is held to the last digit, as a number or as text; a whole number may be one with a fraction."""
+    if isinstance(stored, str):
+        return type(value)(stored) == value
+    return bool(stored == value)
+
+
+# GDAL takes the largest whole number of 64 bits, which it reads as it is, for a clamped one.
+@pytest.mark.filterwarnings("ignore:Integer values probably ranging out of 64bit:RuntimeWarning")
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.one_of(
+        st.lists(st.one_of(st.none(), whole_numbers), min_size=1, max_size=6),
+        st.lists(st.one_of(st.none(), whole_numbers, st.floats(allow_nan=False, allow_infinity=False)), min_size=1),
+    )
+)
+@example([2**53 + 1, None])
+@example([2**53 + 1, 0.5])
+@example([None, 2**53 + 1, 0.5])
+@example([2**53, 0.5, None])
+@example([-(2**53) - 1, 0.0])
+@example([2**63 - 1, -(2**63), None])
+@example([2**63, None, 1])
+@example([2**64, -(2**64)])
+@example([2**63 - 1, 1e300])
+def test_whole_numbers_keep_all_digits(tmp_path: Path, column: list[int | float | None]) -> None:
+    figures = [figure("a", ZURICH, {"x": value}) for value in column]
+    write_geopackage(figures, tmp_path / "a.gpkg")
+    stored = [row["x"] for row in _rows(tmp_path / "a.gpkg")]
+    said = [each["properties"]["x"] for each in _geojson(figures, tmp_path / "a.geojson")]
+    for value, *found in zip(column, stored, said, strict=True):
+        assert all(each is None if value is None else _is_stored(each, value) for each in found)
+    whole = [value for value in column if value is not None]
+    if whole and all(type(value) is int and -(2**63) <= value < 2**63 for value in whole):
+        assert all(type(each) is int for each in stored if each is not None)
+        assert said == column
+    # One number that GDAL does not know makes the whole file unreadable.
+    assert pyogrio.read_info(tmp_path / "a.geojson")["features"] == len(column)
 
 
 @pytest.mark.parametrize("places", [[ZURICH], [CLAMPED], [ZURICH, CLAMPED], [CLAMPED, ZURICH]])

@@ -7,6 +7,7 @@ import os
 import random
 import shutil
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from exporters.figure_reader import read_figures
 from exporters.gltf.reader import read_gltf
 from exporters.placed_figure import figure_of
 from exporters.tiles.gather import write_figures
+from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR
 from exporters.validate import validate
 from exporters.write import write
 from fig2mesh.commands.main import main
@@ -237,6 +239,27 @@ def test_old_content_is_not_gathered(tmp_path: Path, folder: Path) -> None:
     write_figures([folder], tmp_path / "old", version="1.0")
     with pytest.raises(ExportError, match=r"give the \.glb files"):
         write_figures([tmp_path / "old"], tmp_path / "out")
+
+
+def test_the_command_gives_each_figure_the_range_of_its_height(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heights = {"person": 1.79, "tower": 180.0, "map": 1800.0}
+    for name, height in heights.items():
+        write(asset(replace(ZURICH, figure_height_m=height), lods=SMALL, name=name), tmp_path / "in" / f"{name}.glb")
+    assert main(["tileset", str(tmp_path / "in"), "-o", str(tmp_path / "out")]) == 0
+    assert "--visible-from" not in capsys.readouterr().err
+    for each in contents(tmp_path / "out"):
+        height = heights[Path(each.uri).stem]
+        assert 103.923 * each.errors[-2] == pytest.approx(2000 / 1.79 * height, rel=1e-4)
+    assert validate(tmp_path / "out", external=False) == []
+    main(["tileset", str(tmp_path / "out"), "-o", str(tmp_path / "again")])
+    assert _bytes(tmp_path / "again") == _bytes(tmp_path / "out")
+    capsys.readouterr()
+    main(["tileset", str(tmp_path / "in"), "-o", str(tmp_path / "near"), "--visible-from", "2000"])
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "--visible-from" in line]
+    assert "a figure 1800 m tall is not drawn" in line
+    assert {each.errors[-2] for each in contents(tmp_path / "near")} == {2000.0 / VISIBLE_RANGE_PER_ERROR}
 
 
 def test_the_command(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,14 @@ from hypothesis import strategies as st
 from exporters.errors import ExportError
 from exporters.georeference import placement_of_tile
 from exporters.gltf.reader import read_gltf
-from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR, root_tile, tileset, write_tileset
+from exporters.tiles.tileset import (
+    VISIBLE_RANGE_PER_ERROR,
+    root_tile,
+    tileset,
+    too_near_note,
+    visible_range,
+    write_tileset,
+)
 from exporters.validate import validate
 from georef.errors import InputError
 from georef.geodesy import ecef_from_geodetic
@@ -58,6 +66,26 @@ def test_visible_from_sets_the_error_of_the_tileset(distance: float) -> None:
     # 1080 rows, 60 degrees across 1920 columns: CesiumJS stops drawing at 16 pixels, 104 m away per metre of error.
     assert document["geometricError"] * 104 == pytest.approx(max(distance, 0.0228 * 104), rel=2e-3)
     assert pytest.approx(103.9, abs=0.1) == VISIBLE_RANGE_PER_ERROR
+
+
+@pytest.mark.parametrize("height", [0.02, 1.0, 1.79, 1800.0, 6186.2, 400_000.0])
+def test_the_range_grows_with_the_figure(height: float) -> None:
+    error = tileset(asset(replace(ZURICH, figure_height_m=height)))["geometricError"]
+    assert error * 103.923 == pytest.approx(height / 1.79 * 2000, rel=1e-4)
+
+
+def test_a_person_has_a_range_of_two_kilometres() -> None:
+    assert visible_range(1.79) == 2000.0
+    assert tileset(asset(ZURICH))["geometricError"] == 2000.0 / VISIBLE_RANGE_PER_ERROR
+
+
+def test_a_range_of_less_than_ten_heights_is_noted() -> None:
+    assert too_near_note(None, 6186.2) is None
+    assert too_near_note(18_000.0, 1800.0) is None
+    note = too_near_note(2000.0, 1800.0)
+    assert note is not None
+    assert note.startswith("--visible-from: from farther than 2000 m a figure 1800 m tall is not drawn")
+    assert "\n" not in note
 
 
 def test_box_holds_every_vertex_of_every_level(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -190,6 +191,39 @@ def test_visible_from_is_the_error_of_all_inner_tiles() -> None:
             assert (tile["geometricError"], tile["refine"]) == (0, "REPLACE")
     assert document["geometricError"] == error
     assert inner == 4
+
+
+def mixed(count: int, spread_deg: float, seed: int = 3) -> list[PlacedFigure]:
+    """Figures of 1.79 m, 180 m and 6 km side by side, each at its own scale."""
+    random = np.random.default_rng(seed)
+    found = []
+    for each, height in zip(crowd(count, seed, spread_deg), random.choice([1.79, 180.0, 6186.2], count), strict=True):
+        low, high = ((np.array(corner) * height / 1.79).tolist() for corner in (LOW, HIGH))
+        place = replace(each.placement, figure_height_m=float(height))
+        found.append(replace(each, placement=place, low=tuple(low), high=tuple(high)))
+    return found
+
+
+@pytest.mark.parametrize("version", ["1.0", "1.1"])
+def test_figures_of_any_heights_have_their_own_ranges(version: str) -> None:
+    figures = mixed(700, 2.0)
+    found = documents(figures, visible_from_m=None, version=version)
+    ranges = {each.contents[0]: 2000 / 1.79 * each.placement.figure_height_m for each in figures}
+    met = list(contents(found))
+    assert {each.uri for each in met} == set(ranges)
+    for each in met:
+        # CesiumJS tests a tile against the error of its parent, the one before its own, and each one above.
+        assert each.errors[-2] * VISIBLE_RANGE_PER_ERROR == pytest.approx(ranges[each.uri], rel=1e-9)
+        assert list(each.errors) == sorted(each.errors, reverse=True)
+        placed = ecef_from_tile(figures[int(each.uri.split("/")[1].split("_")[0])].placement).matrix
+        assert np.array_equal(each.matrix, placed)
+        for (centre, axes), (inner, inner_axes) in zip(each.boxes, each.boxes[1:], strict=False):
+            assert outside(box_corners([*inner, *inner_axes.ravel()]), centre, axes) < 1e-8
+    assert found["tileset.json"]["geometricError"] * VISIBLE_RANGE_PER_ERROR == pytest.approx(max(ranges.values()))
+
+
+def test_people_alone_are_drawn_from_two_kilometres() -> None:
+    assert documents(crowd(100), visible_from_m=None) == documents(crowd(100), visible_from_m=2000.0)
 
 
 def test_a_coarse_level_is_never_worse_than_the_tileset() -> None:

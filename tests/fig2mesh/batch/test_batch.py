@@ -16,10 +16,13 @@ from typing import Any
 import pystac
 import pytest
 
+from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR
 from exporters.validate import validate
 from fig2mesh.batch.ledger import WORK
+from fig2mesh.batch.row_request import FORMATS
 from fig2mesh.commands.main import main
 from tests.benchmarks.batch import convert
+from tests.exporters.walk import contents
 from tests.fig2mesh.batch.small import QUICK, events, manifest, tree, write_csv, write_pictures
 
 pytestmark = pytest.mark.slow
@@ -179,6 +182,70 @@ def test_files_of_others_and_a_second_batch_are_refused(
     with FileLock(tmp_path / WORK / "lock"):
         assert main(["batch", str(collection), "-o", str(tmp_path)]) == 2
     assert "another batch is writing there" in capsys.readouterr().err
+
+
+SHIPPED = Path(__file__).resolve().parents[3] / "examples" / "figures" / "farmer"
+
+
+@pytest.fixture
+def shipped(tmp_path: Path) -> Path:
+    """A collection of one shipped figure, three times, of the height of a person, a tower, and on a map."""
+    rows = [
+        {
+            "figure": SHIPPED / "image.png",
+            "keypoints": SHIPPED / "keypoints.json",
+            "name": name,
+            "height_m": height,
+            "lon": 8.5 + height / 1e5,
+            "lat": 47.4,
+            **QUICK,
+        }
+        for name, height in (("person", 1.79), ("tower", 180.0), ("map", 1800.0))
+    ]
+    return write_csv(tmp_path / "people.csv", rows)
+
+
+def test_formats_and_date_of_the_command_line_are_made(
+    shipped: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["batch", str(shipped), "--root", str(SHIPPED.anchor)]
+    out = tmp_path / "out"
+    assert main([*words, "-o", str(out), "--format", "ply", "--format", ".usdc", "--date", "1893-05-17"]) == 0
+    capsys.readouterr()
+    for row in manifest(out):
+        assert set(row["outputs"]) == {f"{row['name']}/{row['name']}.{suffix}" for suffix in ("glb", "ply", "usdc")}
+        assert all((out / name).stat().st_size > 1000 for name in row["outputs"])
+        assert not [each for each in validate(out / row["name"] / f"{row['name']}.ply") if each.severity == "error"]
+    for item in pystac.Collection.from_file(str(out / "collection.json")).get_items():
+        assert item.properties["start_datetime"].startswith("1893-05-17")
+    for suffix in FORMATS:
+        assert main([*words, "--dry-run", "--format", suffix, "--date", "1893"]) == 0
+        assert "3 rows: 3 are fine, 0 are not" in capsys.readouterr().err
+    for option, value in (("--format", "doc"), ("--date", "around 1893")):
+        assert main([*words, "-o", str(tmp_path / "none"), option, value]) == 2
+        said = capsys.readouterr().err
+        assert f"{option}: {value!r}" in said or f"{option}: {value};" in said
+        assert said.count("\n") == 1
+        assert not (tmp_path / "none").exists()
+
+
+def test_figures_of_any_heights_are_drawn_from_as_far_as_their_own(
+    shipped: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["batch", str(shipped), "--root", str(SHIPPED.anchor), "-o", str(tmp_path / "out")]
+    assert main(words) == 0
+    assert "--visible-from" not in capsys.readouterr().err
+    heights = {"person": 1.79, "tower": 180.0, "map": 1800.0}
+    for each in contents(tmp_path / "out"):
+        height = heights[Path(each.uri).stem]
+        assert 103.923 * each.errors[-2] == pytest.approx(2000 / 1.79 * height, rel=1e-4)
+    root = json.loads((tmp_path / "out" / "tileset.json").read_text())
+    assert 104 * root["geometricError"] > 1000 * 1800
+    assert not [f for f in validate(tmp_path / "out" / "tileset.json") if f.severity in ("error", "warning")]
+    assert main([*words, "--visible-from", "2000"]) == 0
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "--visible-from" in line]
+    assert "a figure 1800 m tall is not drawn" in line
+    assert {each.errors[-2] for each in contents(tmp_path / "out")} == {2000.0 / VISIBLE_RANGE_PER_ERROR}
 
 
 def _command(collection: Path, out: Path) -> list[str]:

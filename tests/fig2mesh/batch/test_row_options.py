@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fig2mesh.batch.row_options import OURS, defaults_of, is_known, known_columns, options_of
+from fig2mesh.batch.row_request import FORMATS
 from fig2mesh.commands.main import make
 from fig2mesh.errors import InputError
 
@@ -91,6 +92,15 @@ def test_a_row_goes_before_the_defaults() -> None:
     assert (own["quality"], own["map_sheet"], own["effects"], own["seed"]) == ("draft", None, ("light",), 3)
     other = options_of({"figure": "a", "map": "other.tif"}, {"lonlat": (1.0, 2.0)}, "n").values
     assert (other["lonlat"], other["map_sheet"]) == (None, Path("other.tif"))
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_format_and_date_of_the_command_line_hold_for_rows_without(suffix: str) -> None:
+    bare = options_of({"figure": "a"}, {"format": (suffix,), "date": "1893"}, "n")
+    assert (bare.formats, bare.date) == ((suffix,), "1893")
+    own = options_of({"figure": "a", "format": "ply", "date": 1895}, {"format": (suffix,), "date": "1893"}, "n")
+    assert (own.formats, own.date) == (("ply",), "1895")
+    assert bare.values == options_of({"figure": "a"}, {}, "n").values
 
 
 def test_what_is_no_option_is_an_attribute() -> None:

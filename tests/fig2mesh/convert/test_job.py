@@ -11,6 +11,7 @@ import pygltflib
 import pytest
 
 from exporters.inspect import inspect
+from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR
 from exporters.validate import validate
 from fig2mesh.commands.main import main
 from fig2mesh.measure.model import load_textured, shape_measures
@@ -189,6 +190,24 @@ def test_resuming_gives_the_same_model(finished: Run, tmp_path: Path) -> None:
         "simplify",
         "surface",
     }
+
+
+@pytest.mark.parametrize("height", [1.79, 1800.0])
+def test_a_figure_is_drawn_from_a_thousand_times_its_height(
+    finished: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str], height: float
+) -> None:
+    arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--lonlat", *ZURICH]
+    arguments += ["--height-m", str(height), "--quality", "draft", "--parts", "outline", "--textures", "none"]
+    arguments += ["--mesher", "isosurface", "--triangles", "800", "-o", str(tmp_path / "b"), "--overwrite"]
+    assert main(arguments) == 0
+    assert "--visible-from" not in capsys.readouterr().err
+    error = json.loads((tmp_path / "b" / "tileset.json").read_text())["geometricError"]
+    assert 104 * error >= 1000 * height
+    if height == 1.79:
+        assert error == 2000.0 / VISIBLE_RANGE_PER_ERROR
+    assert main([*arguments, "--visible-from", str(5 * height)]) == 0
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "--visible-from" in line]
+    assert f"a figure {height:g} m tall is not drawn" in line
 
 
 def test_tiles_for_older_clients(finished: Run, tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def test_gdal_reads_world_files_alike(tmp_path: Path) -> None:
     sheet = picture(tmp_path / "map.png")
     world_file(tmp_path / "map.pgw")
     with rasterio.open(sheet) as file:
-        east, north = file.transform * PROBE.T
+        east, north = file.transform @ PROBE.T
     there = lonlat(np.stack([east, north], axis=1))
     assert at_home(sheet, map_crs=SWISS) == pytest.approx(there, abs=DEG)
 
