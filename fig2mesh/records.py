@@ -94,6 +94,16 @@ class Figure(_Checked):
             if limb not in LIMBS or order not in get_args(DepthOrder):
                 raise ValueError(f"depth_order: {limb!r}: {order!r}, expected {LIMBS} to be front or behind")
 
+    def _repr_png_(self) -> bytes:
+        """The figure without its background, as notebooks show it."""
+        from io import BytesIO
+
+        from PIL import Image
+
+        stream = BytesIO()
+        Image.fromarray(np.where(self.mask[..., None], self.rgba, np.uint8(0))).save(stream, "PNG")
+        return stream.getvalue()
+
 
 @dataclass(frozen=True)
 class Pose3D(_Checked):

@@ -32,7 +32,7 @@ class Settings:
     textures : of unseen sides: as networks paint them, or plain colours of what is drawn before them; none at all
     contours : of the silhouette, if drawn: kept on the surface, or left to whoever shows the model
     light : clients light the surface; without, they show its colours as they are
-    normals : whether any output or effect needs shading normals, see `fig2mesh.convert.plan`
+    normals : whether any output or effect needs shading normals, see `fig2mesh.conversion.plan`
     device : "cpu" or "cuda"
     seed : of everything random
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 from fig2mesh.annotate.editing import Subject, begin
 from fig2mesh.annotate.request import AnnotateRequest
 from fig2mesh.annotate.server import annotation_server
-from fig2mesh.convert.request import HEIGHT_M
+from fig2mesh.conversion.request import HEIGHT_M
 from fig2mesh.errors import FigureError, OutputError
 from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, on_whole_picture, write_annotation
 from fig2mesh.settings import Parts, settings_for

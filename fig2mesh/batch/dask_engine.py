@@ -42,7 +42,10 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Facts:
-    """What a worker says of itself. code : see `keys.fingerprint`; sees : whether it sees the folder."""
+    """What a worker says of itself.
+
+    code : `fig2mesh.conversion.keys.fingerprint`; sees : whether it sees the folder; threads : of torch
+    """
 
     code: str
     sees: bool
@@ -77,7 +80,7 @@ class DaskEngine:
             raise
 
     def _check(self) -> None:
-        from fig2mesh.batch.keys import fingerprint
+        from fig2mesh.conversion.keys import fingerprint
 
         with suppress(TimeoutError):
             self._client.wait_for_workers(1, timeout=WORKERS_S)
@@ -180,7 +183,7 @@ class DaskEngine:
 
 def _facts(mark: str, dask_worker: Any) -> Facts:
     """Runs on every worker; dask_worker : which one, given by Dask to functions with such a parameter."""
-    from fig2mesh.batch.keys import fingerprint
+    from fig2mesh.conversion.keys import fingerprint
 
     return Facts(fingerprint(), os.path.exists(mark), dask_worker.state.nthreads)
 

@@ -15,17 +15,17 @@ from typing import Any, Final
 from exporters.gis.time_span import time_span
 from exporters.tiles.tileset import too_near_note
 from fig2mesh.batch.collections.read import read_rows
+from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column
 from fig2mesh.batch.engine import Engine, Stage
 from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.local_engine import LocalEngine
-from fig2mesh.batch.progress import Kind, Tally, watching
+from fig2mesh.batch.progress import Tally, watching
+from fig2mesh.batch.request import BatchRequest
 from fig2mesh.batch.row_files import Roots
 from fig2mesh.batch.row_job import LASTING
-from fig2mesh.batch.row_options import OWN_COLUMNS, known_columns
-from fig2mesh.batch.row_request import check_formats
 from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apart
 from fig2mesh.batch.task import Batch, Outcome
-from fig2mesh.batch.tasks import TAKEN, read_spool, tasks_of, write_spool
+from fig2mesh.batch.tasks import TAKEN, check_formats, read_spool, tasks_of, write_spool
 from fig2mesh.errors import InputError, OutputError
 
 log = logging.getLogger("fig2mesh")
@@ -34,70 +34,30 @@ WORKER_BYTES: Final = 2_500_000_000
 """Memory that a figure of standard quality takes at most, networks included."""
 
 
-def run(
-    *,
-    collection: Path,
-    output: Path | None,
-    jobs: int | None,
-    engine: str,
-    address: str | None,
-    resume: bool,
-    dry_run: bool,
-    progress: Kind,
-    timeout: float,
-    root: Path | None,
-    layer: str | None,
-    unplaced: bool,
-    title: str | None,
-    visible_from: float | None,
-    overwrite: bool,
-    quiet: bool,
-    verbose: int,
-    defaults: dict[str, Any],
-) -> int:
-    """What `fig2mesh batch COLLECTION -o DIR …` does; the parameters are the options of the command line.
-
-    defaults : options of the main job for rows that have none, column → value
+def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
+    """Do what `fig2mesh batch` asks for.
 
     Returns the exit code: 0 all rows are done, 2 some are not because of their input, 1 because of us.
     """
-    from fig2mesh.convert.job import check_visible_from, configure_logging
-
-    configure_logging(quiet, verbose)
-    if engine == "dask" and address is None:
-        raise InputError("--engine dask", "no scheduler is named", "pass --address tcp://HOST:8786")
-    if engine == "local" and address is not None:
-        raise InputError("--address", "given without --engine dask", "pass --engine dask as well")
-    if output is None and not dry_run:
-        raise InputError("-o", "no folder for the outputs", "pass -o DIR")
-    check_visible_from(visible_from)
-    check_formats(defaults.get("format", ()), "--format")
-    if "date" in defaults:
-        time_span(defaults["date"], "--date")
-    if root is not None and not root.is_dir():
-        raise InputError("--root", f"no folder {root}", "name a folder that holds the collection's files")
-    base = Path(os.path.abspath(collection)).parent
-    roots = Roots(base, Path(os.path.realpath(root or base)))
-
-    with _folder(output, dry_run, overwrite) as folder:
-        batch = Batch(roots, folder, defaults, not resume, overwrite, unplaced)
+    defaults = request.row_defaults
+    check_formats(request.formats, "--format")
+    if request.date is not None:
+        time_span(request.date, "--date")
+    base = Path(os.path.abspath(request.collection)).parent
+    roots = Roots(base, Path(os.path.realpath(request.root or base)))
+    with _folder(request.output, request.dry_run, request.overwrite) as folder:
+        batch = Batch(roots, folder, not request.resume, request.overwrite, request.unplaced)
         spool = folder / WORK / "rows.jsonl"
         partial = spool.with_suffix(".partial")
-        count, unknown = write_spool(tasks_of(read_rows(collection, layer)), partial)
+        count, unknown = write_spool(tasks_of(read_rows(request.collection, request.layer), defaults), partial)
         os.replace(partial, spool)
         if count == 0:
-            raise InputError(collection, "has no rows", "give one row for each figure")
+            raise InputError(request.collection, "has no rows", "give one row for each figure")
         _tell_unknown(unknown)
         tally = Tally(count)
-        runner: Engine
-        if engine == "dask":
-            from fig2mesh.batch.dask_engine import DaskEngine
-
-            runner = DaskEngine(batch, str(address), dry_run)
-        else:
-            runner = LocalEngine(batch, min(jobs or usual_jobs(), count), timeout, dry_run)
-        with watching(progress, tally, bool(verbose), quiet) as watchers:
-            for notice in runner.run(read_spool(spool)):
+        engine = _engine(request, batch, count)
+        with watching(request.progress, tally, bool(verbose), quiet) as watchers:
+            for notice in engine.run(read_spool(spool)):
                 if isinstance(notice, Stage):
                     for watcher in watchers:
                         watcher.stage(notice)
@@ -105,20 +65,27 @@ def run(
                 tally.add(notice)
                 for watcher in watchers:
                     watcher.row(notice, tally)
-                if notice.full and not dry_run:
+                if notice.full and not request.dry_run:
                     raise OutputError(folder, "the disk is full", "free some space and run the same command again")
-                if notice.lost and not dry_run:
+                if notice.lost and not request.dry_run:
                     _keep_failure(folder, notice)
-        if dry_run:
+        if request.dry_run:
             log.info("%d rows: %d are fine, %d are not", count, count - tally.failed, tally.failed)
         else:
-            columns = tuple(unknown)
-            name = title or collection.stem
-            summary = summarise_apart(Collection(folder, spool, columns, name, visible_from))
+            title = request.title or request.collection.stem
+            summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
             _tell(folder, tally, summary)
-            if summary.figures and (note := too_near_note(visible_from, summary.tallest_m)):
+            if summary.figures and (note := too_near_note(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)
         return 0 if not tally.failed else 1 if tally.ours else 2
+
+
+def _engine(request: BatchRequest, batch: Batch, count: int) -> Engine:
+    if request.engine == "dask":
+        from fig2mesh.batch.dask_engine import DaskEngine
+
+        return DaskEngine(batch, str(request.address), request.dry_run)
+    return LocalEngine(batch, min(request.jobs or usual_jobs(), count), request.timeout, request.dry_run)
 
 
 def usual_jobs() -> int:
@@ -172,7 +139,7 @@ def _tell_unknown(unknown: dict[str, int]) -> None:
     """Say which columns are no options; one that is nearly called like an option may be a slip."""
     if not unknown:
         return
-    known = [*known_columns(), *OWN_COLUMNS]
+    known = [*fields_by_column(), *OWN_COLUMNS]
     shown = []
     for column in list(unknown)[:20]:
         near = difflib.get_close_matches(column, known, 1, 0.8)

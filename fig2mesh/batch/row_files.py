@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import os
 import stat
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from exporters.file_digest import sha256_of
-from fig2mesh.batch.row_options import DATUMS, PATHS
+from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
+
+DATUMS = ("ellipsoid", "egm96")
+"""Values of --altitude-datum that are not files."""
+
+FILE_FIELDS = ("mask", "keypoints", "part_labels", "map", "altitude_datum")
+"""Fields of a request, besides the figure, that may name a file."""
 
 
 @dataclass(frozen=True)
@@ -47,24 +54,24 @@ class Roots:
         return text
 
 
-def inside(values: dict[str, Any], roots: Roots, trusted: frozenset[str]) -> dict[str, Any]:
-    """Parameters of the main job with the paths that the row names resolved.
+def resolve(request: Request, roots: Roots, own: Collection[str]) -> Request:
+    """The request of a row with the paths that the row names resolved.
 
-    trusted : parameters that are from the command line, not from the row
+    own : names of the fields whose files the row names; others are from the command line, which may name any
+
+    Raises InputError naming the column.
     """
-    resolved = dict(values)
-    resolved["figure"] = roots.resolve("figure", values["figure"])
-    for name in PATHS:
-        if values[name] is not None and name not in trusted:
-            resolved[name] = roots.resolve(name.removesuffix("_sheet"), values[name])
-    datum = values["altitude_datum"]
-    if datum not in DATUMS and "altitude_datum" not in trusted:
-        resolved["altitude_datum"] = str(roots.resolve("altitude_datum", Path(datum)))
-    sheet = resolved["map_sheet"]
-    if sheet is not None and "map_sheet" not in trusted:
-        for file in sheet_files(sheet):
+    changes: dict[str, Any] = {"figure": roots.resolve("figure", request.figure)}
+    for name in own:
+        value = getattr(request, name)
+        if name == "altitude_datum" and value not in DATUMS:
+            changes[name] = str(roots.resolve(name, Path(value)))
+        elif isinstance(value, Path):
+            changes[name] = roots.resolve(name, value)
+    if "map" in changes:
+        for file in sheet_files(changes["map"]):
             roots.resolve("map", file)
-    return resolved
+    return replace(request, **changes)
 
 
 def sheet_files(sheet: Path) -> list[Path]:
@@ -74,14 +81,16 @@ def sheet_files(sheet: Path) -> list[Path]:
     return sorted({sheet, *beside})
 
 
-def input_files(values: dict[str, Any]) -> dict[str, list[Path]]:
-    """Parameter → the files that decide what becomes of it; of resolved parameters."""
-    files = {"figure": [values["figure"]]}
-    for name in PATHS:
-        if values[name] is not None:
-            files[name] = sheet_files(values[name]) if name == "map_sheet" else [values[name]]
-    if values["altitude_datum"] not in DATUMS:
-        files["altitude_datum"] = [Path(values["altitude_datum"])]
+def input_files(request: Request) -> dict[str, list[Path]]:
+    """Files that decide what becomes of a resolved request, by the field that names them."""
+    files = {"figure": [request.figure]}
+    for name in ("mask", "keypoints", "part_labels"):
+        if (path := getattr(request, name)) is not None:
+            files[name] = [path]
+    if request.map is not None:
+        files["map"] = sheet_files(request.map)
+    if request.altitude_datum not in DATUMS:
+        files["altitude_datum"] = [Path(request.altitude_datum)]
     return files
 
 

@@ -14,17 +14,22 @@ from typing import TYPE_CHECKING, Any
 
 from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
+from fig2mesh.batch.resolved_row import ResolvedRow
 from fig2mesh.batch.row_files import digest_of
-from fig2mesh.batch.row_request import RowRequest
-from fig2mesh.batch.stage_cache import StageCache
 from fig2mesh.batch.task import Batch, Outcome, Task
 from fig2mesh.errors import FigureError, InputError, OutputError
 
 if TYPE_CHECKING:
     from exporters.asset import Asset
     from exporters.placed_figure import Attributes
-    from exporters.profiles import Profile
-    from fig2mesh.convert.place import Placed
+    from fig2mesh.conversion.request import Request
+    from fig2mesh.conversion.stores import KeyedStore
+
+READ = "figure"
+"""Name of the result of reading and parsing, which comes before the stages."""
+
+MEASURES = "measures"
+"""Name of what is measured on the model, which takes longer than writing it."""
 
 UNKNOWN_DATE = "0001/9999"
 """A catalogue must have a date; when a file was changed says nothing of the drawing, and is lost by copying."""
@@ -42,8 +47,7 @@ Advance = Callable[[str], object]
 def check_row(batch: Batch, task: Task) -> Outcome:
     """Read everything that a row names, and say what is wrong; nothing is written, no network runs."""
     try:
-        request = RowRequest(batch, task)
-        request.check()
+        ResolvedRow(batch, task).check()
     except InputError as error:
         return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
     except Exception as error:
@@ -63,14 +67,16 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
     fault: BaseException | None = None
     try:
         try:
-            request = RowRequest(batch, task)
-            record["key"] = request.key
-            if not batch.fresh and before is not None and before.get("key") == request.key and request.stands(before):
+            row = ResolvedRow(batch, task)
+            record["key"] = row.key
+            if not batch.fresh and before is not None and before.get("key") == row.key and row.stands(before):
                 return _outcome(task, before, unchanged=True)
-            request.check_words()
+            row.check_values()
             _claim(batch, task, ledger, record)
-            cache = StageCache(batch.folder / WORK / "stages", batch.fresh)
-            record |= _convert(request, cache, record.get("files", ()), advance) | {"status": "done"}
+            from fig2mesh.conversion.stores import KeyedStore
+
+            store = KeyedStore(batch.folder / WORK / "stages", batch.fresh)
+            record |= _convert(row, store, record.get("files", ()), advance) | {"status": "done"}
         except InputError as error:
             fault = error
             # What the disk refuses may go well next time; what is wrong with the input will not.
@@ -136,109 +142,82 @@ def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> 
             shutil.rmtree(stale, ignore_errors=True)
 
 
-def _convert(request: RowRequest, cache: StageCache, before: Sequence[str], advance: Advance) -> dict[str, Any]:
+def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance: Advance) -> dict[str, Any]:
     """Make the outputs in place of the files `before`; returns what the record says of them."""
     from exporters.placed_figure import figure_of
-    from fig2mesh.batch.keys import key_of, stage_keys
-    from fig2mesh.batch.stage_cache import MEASURES, READ
-    from fig2mesh.convert.asset import asset_of, settings_of, torch_device
-    from fig2mesh.convert.pipeline import steps
-    from fig2mesh.convert.place import place
-    from fig2mesh.convert.plan import plan
-    from fig2mesh.convert.report import model_measures
-    from fig2mesh.convert.stage_file import figure_digest
+    from fig2mesh.conversion.convert import convert
+    from fig2mesh.conversion.keys import key_of
+    from fig2mesh.conversion.observer import Observer
+    from fig2mesh.conversion.report import model_measures
     from fig2mesh.counters import counting
     from fig2mesh.parse.read import read_figure
-    from fig2mesh.parts.pieces import clean
+    from fig2mesh.records import Figure
 
-    profile = request.profile()
-    settings = settings_of(device=torch_device(request.values["device"]), **request.settings())
-    sheet = request.sheet()
+    request, task = row.request, row.task
     with counting() as counts:
         advance("read")
-        own = ("figure", "mask", "keypoints", "part_labels")
-        files = {name: (path.name, digest_of(path)) for name in own if (path := request.values[name]) is not None}
-        key = key_of(stage=READ, files=files, bbox=request.values["bbox"])
-        drawn = cache.make(READ, key, lambda: read_figure(**request.files(), name=READ))
-        figure, pieces, specks = clean(replace(drawn, name=request.task.title), settings.voxel, settings.picture_px)
-        placed = place(request.place, sheet, figure, request.values["figure"])
-        normals = plan(settings, request.targets).normals
-        road = steps(settings, placed.height_m, normals=normals)
-        results: dict[str, Any] = {"figure": figure, "pieces": pieces}
-        keys = stage_keys(figure_digest(figure), settings, normals)
-        cache.make_only(("model", "simplify"), road, results, keys, advance)
-        asset = asset_of(
-            request.task.title,
-            results["model"],
-            settings,
-            placed,
-            source=request.values["figure"].name,
-            quality=request.values["quality"],
-            credit=request.values["credit"],
-            evidence=request.values["evidence"],
+        files = {name: (path.name, digest_of(path)) for name, path in _figure_files(request).items()}
+        key = key_of(stage=READ, files=files, bbox=request.bbox)
+        drawn = store.make(READ, key, Figure, lambda: read_figure(**request.reading(), name=READ))
+        done = convert(
+            request, replace(drawn, name=task.title), sheet=row.sheet(), store=store, observer=Observer(advance)
         )
         advance("write")
-        outputs = _write(request, asset, profile, before)
-        shape = key_of(
-            stage=MEASURES, model=keys["model"], height_m=placed.height_m, evidence=request.values["evidence"]
-        )
-        measures = cache.make(MEASURES, shape, lambda: model_measures(asset, results, placed.height_m))
+        outputs = _write(row, done.asset, before)
+        key = key_of(stage=MEASURES, model=done.run.results.keys["model"], evidence=request.evidence)
+        measures = store.make(MEASURES, key, dict[str, Any], lambda: model_measures(done))
+    asset = done.asset
     record = {
-        "inputs": request.inputs,
+        "inputs": row.inputs,
         "outputs": {name: digest for name, (_, digest) in outputs.items()},
         "sizes": {name: size for name, (size, _) in outputs.items()},
         "files": sorted(outputs),
         "measures": measures,
         "placement": None if asset.placement is None else asdict(asset.placement),
-        "map": placed.map,
-        "notes": _notes(request, placed, specks, measures),
-        "date": request.options.date or UNKNOWN_DATE,
-        "work": {"ran": cache.ran, "reused": cache.reused, "counts": {k: n for k, n in counts.items() if n}},
+        "map": done.placed.map,
+        "notes": [*map(row.batch.roots.shorten, done.placed.notes), *done.notes],
+        "date": task.date or UNKNOWN_DATE,
+        "work": {"ran": store.made, "reused": store.reused, "counts": {k: n for k, n in counts.items() if n}},
     }
     if asset.placement is not None:
-        contents = tuple(f"{request.task.name}/{name}" for name in _levels(request, asset))
-        whole = replace(figure_of(asset, contents), attributes=_plain(request.options.attributes))
+        contents = tuple(f"{task.name}/{name}" for name in _levels(row, asset))
+        whole = replace(figure_of(asset, contents), attributes=_plain(task.attributes))
         record["figure"] = asdict(whole)
     return record
 
 
-def _notes(request: RowRequest, placed: Placed, specks: int, measures: dict[str, Any]) -> list[str]:
-    notes = [request.batch.roots.shorten(note) for note in placed.notes]
-    if specks:
-        notes.append(f"{specks} specks of the silhouette are too small to model and were left out")
-    if measures["components"] != measures["pieces_drawn"]:
-        notes.append(f"{measures['components']} solids for {measures['pieces_drawn']} drawn pieces")
-    return notes
+def _figure_files(request: Request) -> dict[str, Path]:
+    given = {name: getattr(request, name) for name in ("figure", "mask", "keypoints", "part_labels")}
+    return {name: path for name, path in given.items() if path is not None}
 
 
-def _levels(request: RowRequest, asset: Asset) -> list[str]:
+def _levels(row: ResolvedRow, asset: Asset) -> list[str]:
     """Files of the levels of detail, finest first."""
     from exporters.tiles.tileset import content_name
 
-    return [content_name(request.task.name, level) for level in range(len(asset.lods))]
+    return [content_name(row.task.name, level) for level in range(len(asset.lods))]
 
 
-def _write(request: RowRequest, asset: Asset, profile: Profile, before: Sequence[str]) -> dict[str, tuple[int, str]]:
+def _write(row: ResolvedRow, asset: Asset, before: Sequence[str]) -> dict[str, tuple[int, str]]:
     """Write all outputs, or none; returns size and digest of each, by its path below the batch's folder.
 
     before : files that an earlier run has left in the folder of the figure
     """
     from exporters.write import in_order, write, write_whole
 
-    folder = request.batch.folder / request.task.name
-    main = folder / request.targets[0]
+    folder, profile = row.batch.folder / row.task.name, row.profile()
+    main = folder / row.targets[0]
 
     def fill(stage: Path) -> None:
-        for target in in_order(request.targets):
+        for target in in_order(row.targets):
             write(asset, stage / target, profile=profile)
-        for level, name in enumerate(_levels(request, asset)[1:], start=1):
+        for level, name in enumerate(_levels(row, asset)[1:], start=1):
             write(replace(asset, lods=(asset.lods[level],)), stage / name, profile=profile)
 
     outdated = [Path(name).name for name in before]
     files = write_whole(main, main, fill, overwrite=True, outdated=outdated)
     return {
-        file.relative_to(request.batch.folder).as_posix(): (file.stat().st_size, digest_of(file))
-        for file in sorted(files)
+        file.relative_to(row.batch.folder).as_posix(): (file.stat().st_size, digest_of(file)) for file in sorted(files)
     }
 
 

@@ -4,39 +4,60 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.row_files import Roots
+from fig2mesh.conversion.request import Request
 
 
 @dataclass(frozen=True)
 class Batch:
     """What all rows have in common.
 
-    roots : where their files are; folder : of the outputs; defaults : options where a row has none, column → value;
-    fresh : nothing that is kept is used; overwrite : folders of figures that no batch has begun may be replaced;
-    unplaced : rows need no place
+    roots : where their files are; folder : of the outputs; fresh : nothing that is kept is used
+    overwrite : folders of figures that no batch has begun may be replaced; unplaced : rows need no place
     """
 
     roots: Roots
     folder: Path
-    defaults: dict[str, Any]
     fresh: bool = False
     overwrite: bool = False
     unplaced: bool = False
 
 
 @dataclass(frozen=True)
+class Problem:
+    """Why a row cannot be converted; see `georef.errors.InputError`."""
+
+    source: str
+    finding: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.source}: {self.finding}; {self.remedy}"
+
+
+@dataclass(frozen=True)
 class Task:
-    """A row with its name. number, where, values, problem : as in `Row`; name : of its folder; title : for people."""
+    """A row of a collection, ready to be converted.
+
+    number, where : as in `Row`; name : of its folder; title : for people
+    request : None where there is a problem
+    formats : suffixes besides .glb, without dot; date : as in the row, None without
+    attributes : what the row says besides
+    own_files : fields of the request whose files the row names, not the command line
+    """
 
     number: int
     where: str
     name: str
     title: str
-    values: dict[str, Value]
-    problem: str | None = None
+    request: Request | None
+    formats: tuple[str, ...] = ()
+    date: str | None = None
+    attributes: dict[str, Value] = field(default_factory=dict)
+    own_files: tuple[str, ...] = ()
+    problem: Problem | None = None
 
 
 @dataclass(frozen=True)

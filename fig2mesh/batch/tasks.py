@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 from exporters.tiles.tileset import safe_name
-from fig2mesh.batch.row_options import is_known
-from fig2mesh.batch.task import Task
+from fig2mesh.batch.collections.rows import Row
+from fig2mesh.batch.columns import attributes_of, list_of, request_of
+from fig2mesh.batch.row_files import FILE_FIELDS
+from fig2mesh.batch.task import Problem, Task
+from fig2mesh.conversion.fields import as_plain
+from fig2mesh.conversion.request import Request
+from fig2mesh.errors import InputError
 
-if TYPE_CHECKING:
-    from fig2mesh.batch.collections.rows import Row
+FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
+"""What a row may ask for; .glb is always made."""
 
 LONGEST_NAME: Final = 60
 """Characters of a folder's name; file systems allow 255 bytes, and a character takes up to four."""
@@ -46,15 +51,19 @@ class Names:
         self._table.close()
 
 
-def tasks_of(rows: Iterable[Row]) -> Iterator[Task]:
-    """Rows with names: the one that a row gives, else the stem of its picture, with a number where that is taken."""
+def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> Iterator[Task]:
+    """Rows with names: the one that a row gives, else the stem of its picture, with a number where that is taken.
+
+    defaults : options for rows that have none, by column
+    """
     with closing(Names()) as names:
         for row in rows:
-            yield _task(row, names)
+            yield _task(row, names, defaults or {})
 
 
-def _task(row: Row, names: Names) -> Task:
-    values, problem = dict(row.values), row.problem
+def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> Task:
+    values = row.values
+    problem = None if row.problem is None else _problem(row.where, row.problem)
     given = values.get("name")
     title = (
         str(given) if given is not None else PurePosixPath(str(values.get("figure", ""))).stem or f"row {row.number}"
@@ -64,22 +73,60 @@ def _task(row: Row, names: Names) -> Task:
     while (other := names.take(name, row.number)) is not None:
         if given is not None and problem is None:
             whose = f"also that of row {other}" if other else "that of a file of the batch"
-            problem = f"its name {name} is {whose}; give each row a name of its own"
+            problem = _problem(row.where, f"its name {name} is {whose}; give each row a name of its own")
         number += 1
         name = f"{wanted}_{number}"
-    return Task(row.number, row.where, name, title, values, problem)
+    return make_task(row, name, title, defaults, problem)
+
+
+def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> Task:
+    """The task of a row; problem : what is known to be wrong with it already."""
+    values = row.values
+    formats = list_of(values.get("format", defaults.get("format", ())))
+    date = values.get("date", defaults.get("date"))
+    request = None
+    if problem is None:
+        try:
+            request = request_of(values, defaults, title)
+            check_formats(formats, "column format")
+        except InputError as error:
+            request, problem = None, Problem(error.source, error.finding, error.remedy)
+    return Task(
+        row.number,
+        row.where,
+        name,
+        title,
+        request,
+        formats,
+        None if date is None else str(date),
+        attributes_of(values),
+        tuple(field for field in FILE_FIELDS if field in values),
+        problem,
+    )
+
+
+def check_formats(formats: Iterable[str], where: str) -> None:
+    """Raise InputError, about `where`, for a suffix that a row may not ask for."""
+    for each in formats:
+        if each.lower().lstrip(".") not in FORMATS:
+            raise InputError(where, each[:40] or "empty", f"choose from {', '.join(FORMATS)}; .glb is always made")
+
+
+def _problem(where: str, text: str) -> Problem:
+    finding, _, remedy = text.partition("; ")
+    return Problem(where, finding, remedy or "correct the row")
 
 
 def write_spool(tasks: Iterable[Task], path: Path) -> tuple[int, dict[str, int]]:
-    """Write tasks to a file, one a line; returns their number, and in how many rows each unknown column has a value."""
+    """Write tasks to a file, one a line; returns their number, and in how many rows each attribute has a value."""
     count = 0
     unknown: dict[str, int] = {}
     with path.open("w", encoding="utf-8") as stream:
         for task in tasks:
-            stream.write(json.dumps(asdict(task), ensure_ascii=False) + "\n")
+            stream.write(json.dumps(_plain(task), ensure_ascii=False) + "\n")
             count += 1
-            for column in task.values:
-                if not is_known(column) and (column in unknown or len(unknown) < 1000):
+            for column in task.attributes:
+                if column in unknown or len(unknown) < 1000:
                     unknown[column] = unknown.get(column, 0) + 1
     return count, unknown
 
@@ -88,9 +135,29 @@ def read_spool(path: Path) -> Iterator[Task]:
     """The tasks in a file."""
     with path.open(encoding="utf-8") as stream:
         for line in stream:
-            fields = json.loads(line)
-            fields["values"] = {column: _value(value) for column, value in fields["values"].items()}
-            yield Task(**fields)
+            yield _task_from(json.loads(line))
+
+
+def _plain(task: Task) -> dict[str, Any]:
+    fields = {each.name: getattr(task, each.name) for each in dataclasses.fields(task)}
+    return fields | {
+        "request": None if task.request is None else as_plain(task.request),
+        "problem": None if task.problem is None else dataclasses.astuple(task.problem),
+    }
+
+
+def _task_from(fields: dict[str, Any]) -> Task:
+    request, problem = fields["request"], fields["problem"]
+    return Task(
+        **fields
+        | {
+            "request": None if request is None else Request(**request),
+            "problem": None if problem is None else Problem(*problem),
+            "formats": tuple(fields["formats"]),
+            "own_files": tuple(fields["own_files"]),
+            "attributes": {column: _value(value) for column, value in fields["attributes"].items()},
+        }
+    )
 
 
 def _value(value: object) -> object:

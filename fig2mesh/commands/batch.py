@@ -2,65 +2,26 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import click
 
-from fig2mesh.commands.options import FILE, messages
+from fig2mesh.batch.columns import shared_fields
+from fig2mesh.batch.request import BatchRequest
+from fig2mesh.commands.options import messages, parameter_of, request_options
+from fig2mesh.terminal import configure_logging
+
+FROM_USER = (click.core.ParameterSource.COMMANDLINE, click.core.ParameterSource.ENVIRONMENT)
 
 
 @click.command()
-@click.argument("collection", type=FILE)
-@click.option("-o", "--output", type=FILE, metavar="DIR", help="Folder of the outputs.")
-@click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Rows at a time; default: one for each core.")
-@click.option(
-    "--engine",
-    type=click.Choice(["local", "dask"]),
-    default="local",
-    show_default=True,
-    help="Worker processes of this machine, or a Dask cluster.",
-)
-@click.option("--address", metavar="tcp://…", help="Of the Dask scheduler.")
-@click.option(
-    "--resume/--fresh",
-    default=True,
-    show_default=True,
-    help="Keep what an earlier run has finished, or make everything anew.",
-)
-@click.option(
-    "--format", "formats", multiple=True, metavar="SUFFIX", help="Made besides .glb, such as usdz; repeatable."
-)
-@click.option("--dry-run", is_flag=True, help="Check every row, report all problems, write nothing.")
-@click.option(
-    "--progress",
-    type=click.Choice(["auto", "bar", "json", "none"]),
-    default="auto",
-    show_default=True,
-    help="json: events on stdout, one a line. With -v the bar shows what each worker does.",
-)
-@click.option(
-    "--timeout",
-    type=click.FloatRange(1),
-    default=1800.0,
-    show_default=True,
-    metavar="S",
-    help="Longest that a row may take (local engine).",
-)
-@click.option("--root", type=FILE, metavar="DIR", help="Folder that rows' files may not leave; default: COLLECTION's.")
-@click.option("--layer", metavar="NAME", help="Of a GeoPackage; default: the one with a column figure.")
-@click.option("--unplaced", is_flag=True, help="Rows need no place on the earth.")
-@click.option("--date", metavar="DATE", help="Of rows that have none: 1893, 1893-05-17, 1893/1895; for the catalogue.")
-@click.option("--title", metavar="TEXT", help="Of the catalogue; default: COLLECTION's stem.")
-@click.option(
-    "--visible-from",
-    type=float,
-    metavar="M",
-    help="Distance from which figures of the tileset are drawn; default: about 1,100 times the height of each.",
-)
-@click.option("--overwrite", is_flag=True, help="Replace files in DIR that are not of an earlier batch.")
+@request_options(BatchRequest)
 @messages
 @click.pass_context
-def batch(context: click.Context, /, formats: tuple[str, ...], date: str | None, **options: Any) -> int:
+def batch(context: click.Context, /, request: BatchRequest, quiet: bool, verbose: int, **shared: Any) -> int:
     """Convert a collection of figures.
 
     COLLECTION is a CSV, GeoJSON or GeoPackage with a row for each figure: figure (its picture, seen from COLLECTION's
@@ -71,21 +32,23 @@ def batch(context: click.Context, /, formats: tuple[str, ...], date: str | None,
     the same command again after whatever has happened: only what is missing or has changed is made.
     """
     from fig2mesh.batch.job import run
-    from fig2mesh.batch.row_options import given_defaults, row_defaults
 
-    names = {option.name for option in row_defaults()}
-    defaults = given_defaults(context)
-    if formats:
-        defaults["format"] = formats
-    if date is not None:
-        defaults["date"] = date
-    return run(**{name: value for name, value in options.items() if name not in names}, defaults=defaults)
+    configure_logging(quiet, verbose)
+    defaults = {
+        field.name: _from_anywhere(field.name, shared[field.field])
+        for field in shared_fields()
+        if context.get_parameter_source(field.field) in FROM_USER
+    }
+    return run(replace(request, defaults=defaults), quiet, verbose)
 
 
-def add_to(cli: click.Group, main_job: click.Command) -> None:
-    """Make `batch` a command of `cli`; main_job : whose options hold for all rows when they are given."""
-    from fig2mesh.batch.row_options import defaults_of
+def _from_anywhere(column: str, value: Any) -> Any:
+    """A value whose paths are seen from here, not from the folder of the collection."""
+    from fig2mesh.batch.row_files import DATUMS
 
-    own = {option.name for option in batch.params}
-    batch.params += [option for option in defaults_of(main_job) if option.name not in own]
-    cli.add_command(batch)
+    file = isinstance(value, Path) or (column == "altitude_datum" and value not in DATUMS)
+    return os.path.abspath(value) if file else value
+
+
+for each in reversed(shared_fields()):
+    batch = parameter_of(each)(batch)

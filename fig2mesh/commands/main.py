@@ -28,8 +28,8 @@ from fig2mesh.commands.tradeoff import tradeoff
 from fig2mesh.commands.train import train
 from fig2mesh.commands.validate import validate
 from fig2mesh.commands.view import view
-from fig2mesh.convert.fields import request_fields
-from fig2mesh.convert.request import (
+from fig2mesh.conversion.fields import request_fields
+from fig2mesh.conversion.request import (
     FigureFiles,
     InferenceOptions,
     MeshOptions,
@@ -68,12 +68,13 @@ class MainJobGroup(click.Group):
         formatter.write_usage("fig2mesh", "COMMAND [ARGS]...", "       ")
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        options = {option.name: option for option in self.commands["make"].get_params(ctx)}
+        found = self.commands["make"].get_params(ctx)
+        options = {option.name: option for option in found if isinstance(option, click.Option)}
         sections = {title: [field.field for field in request_fields(part)] for title, part in GROUPS.items()}
         grouped = {name for names in sections.values() for name in names}
         sections["Messages"] = [name for name in options if name not in grouped]
         for title, names in sections.items():
-            records = [record for name in names if (record := options[name].get_help_record(ctx)) is not None]
+            records = [record for name in names if name in options and (record := options[name].get_help_record(ctx))]
             with formatter.section(title):
                 formatter.write_dl(records)
         self.format_commands(ctx, formatter)

@@ -7,7 +7,7 @@ import json
 import click
 
 from fig2mesh.commands.options import messages, request_options
-from fig2mesh.convert.request import Request
+from fig2mesh.conversion.request import Request
 from fig2mesh.terminal import configure_logging, log, progress
 
 
@@ -22,11 +22,11 @@ def make(request: Request, quiet: bool, verbose: int) -> None:
 
 def run(request: Request, quiet: bool = False) -> None:
     """Convert the figure of a request and write its outputs. Raises InputError."""
-    from fig2mesh.convert.convert import convert
-    from fig2mesh.convert.observer import Observer
-    from fig2mesh.convert.outputs import check_request, near_note, write_outputs
-    from fig2mesh.convert.place import clamp_note, log_place
-    from fig2mesh.convert.text_file import write_text
+    from fig2mesh.conversion.convert import convert
+    from fig2mesh.conversion.observer import Observer
+    from fig2mesh.conversion.outputs import check_request, near_note, write_outputs
+    from fig2mesh.conversion.place import clamp_note, log_place
+    from fig2mesh.conversion.text_file import write_text
     from fig2mesh.counters import counting
 
     # Everything that can be refused is refused before the work begins.
@@ -39,7 +39,7 @@ def run(request: Request, quiet: bool = False) -> None:
             log.warning("%s: %s", request.figure, note)
         written = write_outputs(done.asset, request, observer)
     if request.report is not None:
-        from fig2mesh.convert.report import make_report
+        from fig2mesh.conversion.report import make_report
 
         facts = make_report(done, written, observer, counts)
         write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")

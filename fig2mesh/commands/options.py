@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import click
 
-from fig2mesh.convert.fields import RequestField, request_fields
+from fig2mesh.conversion.fields import RequestField, request_fields
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,14 +44,14 @@ def parameter_of(field: RequestField) -> Callable[[F], F]:
     facts, kind = field.option, field.type
     if facts.argument:
         return click.argument(field.field, type=value_type(field), metavar=facts.metavar or None)
-    names = [field.field, f"{field.flag}/--no-{field.flag[2:]}" if field.default is True else field.flag]
+    off = facts.negative or f"no-{field.flag[2:]}"
+    names = [field.field, f"{field.flag}/--{off}" if field.default is True else field.flag]
     if facts.short:
         names.insert(1, f"-{facts.short}")
     if kind.kind is bool:
-        shown = {"show_default": True} if field.default else {"is_flag": True}
-        return click.option(*names, default=field.default, help=facts.help, **shown)
+        shown = bool(field.default)
+        return click.option(*names, default=field.default, help=facts.help, show_default=shown, is_flag=True)
     required = field.default is dataclasses.MISSING
-    show: Any = facts.default_text or (not required and field.default not in (None, "", ()))
     return click.option(
         *names,
         type=value_type(field),
@@ -60,12 +60,12 @@ def parameter_of(field: RequestField) -> Callable[[F], F]:
         nargs=kind.count,
         multiple=kind.many,
         metavar=facts.metavar or None,
-        show_default=show,
-        help=facts.help,
+        show_default=not facts.default_text and not required and field.default not in (None, "", ()),
+        help=f"{facts.help}  [default: {facts.default_text}]" if facts.default_text else facts.help,
     )
 
 
-def value_type(field: RequestField) -> click.ParamType:
+def value_type(field: RequestField) -> Any:
     """The type of one value of a field."""
     kind, low, high = field.type, field.option.low, field.option.high
     if kind.choices:

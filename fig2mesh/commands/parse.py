@@ -8,8 +8,8 @@ from typing import Literal
 import click
 
 from fig2mesh.commands.options import messages, request_options
-from fig2mesh.convert.fields import option, request_class
-from fig2mesh.convert.request import FigureFiles
+from fig2mesh.conversion.fields import option, request_class
+from fig2mesh.conversion.request import FigureFiles
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.terminal import configure_logging, log, progress
 
@@ -83,10 +83,10 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
         raise OutputError(folder / FIGURES, "exists", "pass --overwrite or another folder")
     view = read_view(sheet, None)
     # torch takes seconds to load: what can be refused has been.
-    from fig2mesh.parse.sheet import find_figures
+    from fig2mesh.parse.sheet import figures_in
 
     with progress(quiet) as advance:
-        figures = find_figures(on_white(view.rgba), request.smallest, advance)
+        figures = figures_in(on_white(view.rgba), request.smallest, advance)
     names = write_sheet(folder, figures, sheet.name, view.size, request.format, request.overwrite)
     for name, figure in zip(names, figures, strict=True):
         box = " ".join(map(str, figure.bbox))

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 import click
 
 from fig2mesh.commands.options import messages, request_options
-from fig2mesh.convert.request import Request
+from fig2mesh.conversion.request import Request
 
 
 @click.command("plan")
@@ -17,8 +17,8 @@ from fig2mesh.convert.request import Request
 @messages
 def plan(request: Request, as_json: bool, quiet: bool, verbose: int) -> None:
     """Print which stages and effects a request needs, and why; the options are those of the main job."""
-    from fig2mesh.convert.convert import settings_of
-    from fig2mesh.convert.plan import plan as plan_of
+    from fig2mesh.conversion.convert import settings_of
+    from fig2mesh.conversion.plan import plan as plan_of
 
     request = replace(request, device="cpu")
     planned = plan_of(settings_of(request), request.targets)

@@ -8,7 +8,7 @@ from typing import Literal
 import click
 
 from fig2mesh.commands.options import FILE, messages, request_options
-from fig2mesh.convert.fields import check_fields, option, request_class
+from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.terminal import configure_logging, log
 
 

@@ -36,8 +36,8 @@ def tradeoff(
     FIGURE is a folder with image.png, keypoints.json and, where needed, mask.png, or one picture with --keypoints.
     Each setting runs in a process of its own; all of them take some ten minutes a figure on two cores.
     """
-    from fig2mesh.tradeoff.job import find_figures
+    from fig2mesh.tradeoff.job import drawings_of
     from fig2mesh.tradeoff.job import tradeoff as run
 
-    found = find_figures(figures, keypoints, mask)
+    found = drawings_of(figures, keypoints, mask)
     run(found, folder, knobs or KNOBS, overwrite, lambda line: None if quiet else click.echo(line, err=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fig2mesh.convert.fields import check_fields, option, request_class
+from fig2mesh.conversion.fields import check_fields, option, request_class
 
 
 @request_class

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
-from fig2mesh.convert.convert import run_stages
+from fig2mesh.conversion.convert import run_stages
 from fig2mesh.errors import InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.measure.bleed import bleed_share

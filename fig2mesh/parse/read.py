@@ -53,11 +53,11 @@ class Given:
 
 
 def read_figure(
-    path: Path,
+    path: Path | str,
     *,
-    mask: Path | None = None,
-    keypoints: Path | None = None,
-    part_labels: Path | None = None,
+    mask: Path | str | None = None,
+    keypoints: Path | str | None = None,
+    part_labels: Path | str | None = None,
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
 ) -> Figure:
@@ -77,7 +77,9 @@ def read_figure(
     FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, no figure is
         found in the picture
     """
-    return read_parsed(path, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox, name=name).figure
+    given = {"mask": mask, "keypoints": keypoints, "part_labels": part_labels}
+    files = {option: None if file is None else Path(file) for option, file in given.items()}
+    return read_parsed(Path(path), **files, bbox=bbox, name=name).figure
 
 
 def read_parsed(

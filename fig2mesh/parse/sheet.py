@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from PIL import Image
 
 from fig2mesh.parse.infer import Inference, box_of, infer_figure, look, square
 from fig2mesh.parse.joints import decode
+from fig2mesh.parse.picture import on_white, read_view
 from fig2mesh.records import ByteArray
 
 LONGEST: Final = 2400
@@ -48,10 +50,21 @@ class SheetFigure:
     found: Inference
 
 
-def find_figures(
+def find_figures(sheet: Path | str, smallest_px: float | None = None) -> list[SheetFigure]:
+    """The people drawn on a sheet, from the top down.
+
+    sheet : picture of any size that memory holds; smallest_px : height of the smallest figure that is looked for,
+    pixels; default: a tenth of the longer side
+
+    Raises FigureError where the picture cannot be read.
+    """
+    return figures_in(on_white(read_view(Path(sheet), None).rgba), smallest_px)
+
+
+def figures_in(
     rgb: ByteArray, smallest_px: float | None = None, advance: Callable[[str], object] = lambda name: None
 ) -> list[SheetFigure]:
-    """The figures on a sheet, from the top down.
+    """The figures in a picture, from the top down.
 
     rgb : (H, W, 3) uint8; smallest_px : height of the smallest figure that is looked for; None: a tenth of the longer
     side; advance : told what is under way

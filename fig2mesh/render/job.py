@@ -12,8 +12,8 @@ from typing import Any
 
 from PIL import ImageColor
 
-from fig2mesh.convert.convert import run_stages
-from fig2mesh.convert.text_file import check_text, write_text
+from fig2mesh.conversion.convert import run_stages
+from fig2mesh.conversion.text_file import check_text, write_text
 from fig2mesh.errors import FigureError, InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parse.read import read_figure

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fig2mesh.convert.fields import option, request_class
-from fig2mesh.convert.request import FigureFiles, InferenceOptions
+from fig2mesh.conversion.fields import option, request_class
+from fig2mesh.conversion.request import FigureFiles, InferenceOptions
 from fig2mesh.errors import InputError
 from fig2mesh.render.effects import EFFECTS, Mode
 

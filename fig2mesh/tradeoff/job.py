@@ -17,7 +17,7 @@ from fig2mesh.settings import PRESETS
 Say = Callable[[str], None]
 
 
-def find_figures(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Drawing]:
+def drawings_of(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Drawing]:
     """The files of folders with image.png, keypoints.json and perhaps mask.png, or of one picture."""
     if (keypoints or mask) and (len(figures) != 1 or figures[0].is_dir()):
         raise InputError("--keypoints", "given for several figures or a folder", "give one picture, or folders alone")
@@ -82,7 +82,7 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
 
 
 def _body(files: Drawing) -> Body:
-    from fig2mesh.convert.convert import run_stages
+    from fig2mesh.conversion.convert import run_stages
     from fig2mesh.stages.body import body
 
     return run_stages(read_figure(**files.arguments()), PRESETS["standard"], (body,)).results[body]

@@ -83,8 +83,8 @@ def requests(knobs: Sequence[str]) -> Iterator[tuple[str, str, Settings]]:
 def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
     """One run of the pipeline, timed; a fault of the figure is kept, not raised."""
     from fig2mesh.asset_frame import asset_from_figure, on_drawing
-    from fig2mesh.convert.convert import run_stages
-    from fig2mesh.convert.observer import Observer, peak_mb
+    from fig2mesh.conversion.convert import run_stages
+    from fig2mesh.conversion.observer import Observer, peak_mb
     from fig2mesh.errors import FigureError
     from fig2mesh.image_frame import image_frame
     from fig2mesh.measure.model import front_similarity, silhouette_iou

@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-from fig2mesh.convert.convert import run_stages
-from fig2mesh.convert.observer import Observer
-from fig2mesh.convert.place import log_place, open_map, place
-from fig2mesh.convert.text_file import check_text, write_text
+from fig2mesh.conversion.convert import run_stages
+from fig2mesh.conversion.observer import Observer
+from fig2mesh.conversion.place import log_place, open_map, place
+from fig2mesh.conversion.text_file import check_text, write_text
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parse.read import read_figure

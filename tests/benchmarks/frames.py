@@ -79,19 +79,18 @@ def subjects() -> list[Subject]:
 
 def drawn(name: str) -> Subject:
     """An example of the repository at standard quality."""
-    from fig2mesh.convert.pipeline import steps
+    from fig2mesh.conversion.convert import run_stages
     from fig2mesh.image_frame import image_frame
     from fig2mesh.parse.read import read_figure
     from fig2mesh.render.surface_colours import surface_colours
     from fig2mesh.settings import PRESETS
+    from fig2mesh.stages.body import body
+    from fig2mesh.stages.textures import textures
 
     figure = read_figure(FIGURES / name / "image.png", keypoints=FIGURES / name / "keypoints.json")
-    results: dict[str, Any] = {"figure": figure}
-    for step in steps(PRESETS["standard"], 1.79):
-        if step.name in ("lift", "parts", "body", "textures"):
-            results[step.name] = step.run(*(results[need] for need in step.needs))
-    colours = surface_colours(results["body"], results["textures"], image_frame(figure))
-    return Subject(name.replace("_", " "), results["body"], colours)
+    done = run_stages(figure, PRESETS["standard"], (body, textures))
+    colours = surface_colours(done.results[body], done.results[textures], image_frame(done.figure))
+    return Subject(name.replace("_", " "), done.results[body], colours)
 
 
 def measure(subject: Subject, size: int, close: bool = False, views: int = VIEWS) -> dict[str, float]:

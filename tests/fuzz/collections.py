@@ -39,23 +39,23 @@ def collections() -> Iterator[Input]:
 def read_collection(path: Path) -> None:
     """Rows, their names, and what they ask for."""
     from fig2mesh.batch.collections.read import read_rows
+    from fig2mesh.batch.resolved_row import ResolvedRow
     from fig2mesh.batch.row_files import Roots
-    from fig2mesh.batch.row_request import RowRequest
     from fig2mesh.batch.task import Batch
     from fig2mesh.batch.tasks import tasks_of
     from tests.fuzz.readers import assert_one_line
 
-    batch = Batch(Roots(path.parent, path.parent.resolve()), path.parent / "out", {})
+    batch = Batch(Roots(path.parent, path.parent.resolve()), path.parent / "out")
     for task in islice(tasks_of(read_rows(path)), 1000):
         assert Path(task.name).parts == (task.name,)
         if task.problem is not None:
-            assert_one_line(task.problem)
+            assert_one_line(str(task.problem))
         try:
-            request = RowRequest(batch, task)
+            row = ResolvedRow(batch, task)
         except InputError as error:
             assert_one_line(batch.roots.shorten(str(error)))
         else:
-            assert request.values["figure"].resolve().is_relative_to(batch.roots.root)
+            assert row.request.figure.resolve().is_relative_to(batch.roots.root)
 
 
 def records() -> Iterator[Input]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -140,13 +141,15 @@ def read_drawn_model(path: Path) -> None:
 
 
 def read_stage(path: Path) -> None:
-    from fig2mesh.convert.stage_file import load_stage
+    from fig2mesh.conversion.record_file import read_record
+    from fig2mesh.stages.table import STAGES
 
     beside = path.with_name("stage")
     stage = beside.read_bytes().decode("ascii", "ignore") if beside.is_file() else "lift"
     stage = stage if stage.isalpha() and len(stage) < 40 else "lift"
     shutil.copyfile(path, path.with_name(f"{stage}.npz"))
-    load_stage(path.parent, stage)
+    kinds = {each.name: each.makes for each in STAGES} | {"request": dict[str, Any]}
+    read_record(path.with_name(f"{stage}.npz"), stage, kinds.get(stage, kinds["lift"]))
 
 
 def read_weights(path: Path) -> None:

@@ -336,7 +336,7 @@ def stage_files() -> Iterator[Input]:
     """Files of `--save-stages` with small records, named by what they hold."""
     import tempfile
 
-    from fig2mesh.convert.stage_file import save_stage
+    from fig2mesh.conversion.stores import FolderStore
     from fig2mesh.mesh.solid import Meshing, Solid
     from fig2mesh.records import Mesh, PointCloud, Pose3D, UvMesh
 
@@ -354,7 +354,7 @@ def stage_files() -> Iterator[Input]:
     }
     for name, value in values.items():
         with tempfile.TemporaryDirectory() as folder:
-            save_stage(Path(folder), name, value)
+            FolderStore(Path(folder)).write_file(name, value)
             data = (Path(folder) / f"{name}.npz").read_bytes()
         yield Input("main.npz", {"main.npz": data, "stage": name.encode()})
 

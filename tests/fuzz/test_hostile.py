@@ -23,8 +23,8 @@ from exporters.gltf.reader import read_gltf
 from exporters.inspect import inspect
 from exporters.tiles.b3dm import read_b3dm
 from exporters.validate import validate
-from fig2mesh.convert.record_types import fits
-from fig2mesh.convert.stage_file import load_stage, save_stage
+from fig2mesh.conversion.record_types import fits
+from fig2mesh.conversion.stores import FolderStore
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.picture import read_rgba, read_view
 from fig2mesh.parse.window import is_large
@@ -264,20 +264,20 @@ def _member(head: str, data: bytes = b"") -> bytes:
     ],
 )
 def test_arrays_whose_heads_lie(tmp_path: Path, member: bytes, finding: str) -> None:
-    save_stage(tmp_path, "lift", Pose3D(np.zeros((21, 3), np.float32)))
+    FolderStore(tmp_path).write_file("lift", Pose3D(np.zeros((21, 3), np.float32)))
     with zipfile.ZipFile(tmp_path / "lift.npz") as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     with zipfile.ZipFile(tmp_path / "lift.npz", "w") as archive:
         for name, data in (members | {"a0.npy": member}).items():
             archive.writestr(name, data)
     with pytest.raises(FigureError, match=finding):
-        load_stage(tmp_path, "lift")
+        FolderStore(tmp_path).read_file("lift", Pose3D)
 
 
 def test_a_stage_of_another_kind_and_records_whose_fields_do_not_fit(tmp_path: Path) -> None:
-    save_stage(tmp_path, "lift", Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)))
+    FolderStore(tmp_path).write_file("lift", Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)))
     with pytest.raises(FigureError, match="it holds a Mesh"):
-        load_stage(tmp_path, "lift")
+        FolderStore(tmp_path).read_file("lift", Pose3D)
     assert fits((1, 2.5), tuple[int, float])
     assert not fits((True, 2.5), tuple[int, float])
     assert fits({"a": None}, dict[str, int | None])
@@ -300,7 +300,7 @@ def test_a_stage_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
             struct.pack_into("<I", data, place + 24, 1 << 30)  # what the directory says of each member
     (tmp_path / "lift.npz").write_bytes(data)
     with pytest.raises(FigureError, match=r"unpacks to 3.22 GB, more than 2.15 GB"):
-        load_stage(tmp_path, "lift")
+        FolderStore(tmp_path).read_file("lift", Pose3D)
 
 
 def grid(**tags: tuple[int, int, int]) -> bytes:

@@ -15,7 +15,8 @@ from exporters.gltf.glb import write_glb
 from exporters.gltf.part_borders import split_at_parts
 from exporters.gltf.reader import read_gltf
 from exporters.tiles.tileset import write_tileset
-from fig2mesh.convert.place import PlaceRequest, placement_of
+from fig2mesh.conversion.place import placement_of
+from fig2mesh.conversion.request import PlaceRequest
 from georef.geodesy import ecef_from_asset, ecef_from_geodetic, geodetic_from_ecef, tile_from_asset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import HEIGHT, asset
@@ -141,7 +142,7 @@ def test_vertices_at_the_scale_of_the_earth(
     "places are not wrapped or clipped: 180.0000001 is more often a typing error than a place",
 )
 def test_places_that_are_hardly_there(lonlat: tuple[float, float], altitude: float, finding: str | None) -> None:
-    request = PlaceRequest(lonlat, "N", None, altitude, "ellipsoid")
+    request = PlaceRequest(lonlat=lonlat, facing="N", altitude=altitude)
     if finding is None:
         placed = placement_of(request)
         assert placed is not None

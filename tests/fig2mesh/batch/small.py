@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.ledger import WORK
 from fig2mesh.batch.row_files import Roots
 from fig2mesh.batch.task import Batch, Task
+from fig2mesh.batch.tasks import make_task
 from tests.drawn import write_figure
 
 QUICK = {"quality": "draft", "parts": "outline", "textures": "none", "mesher": "isosurface", "triangles": 800}
@@ -48,12 +50,12 @@ def write_csv(path: Path, rows: Iterable[Mapping[str, Any]]) -> Path:
 
 def batch_of(folder: Path, out: Path, **changes: Any) -> Batch:
     """A batch over the files in `folder`."""
-    return Batch(Roots(folder, folder.resolve()), out, {}, **changes)
+    return Batch(Roots(folder, folder.resolve()), out, **changes)
 
 
 def task_of(values: Mapping[str, Any], name: str = "person", number: int = 1) -> Task:
     """A row with a name."""
-    return Task(number, f"line {number + 1}", name, name, dict(values))
+    return make_task(Row(number, f"line {number + 1}", values), name, name, {})
 
 
 def tree(folder: Path) -> dict[str, str]:

@@ -215,7 +215,7 @@ BAD = {
     "not a picture that can be read": {"figure": "person0.json"},
     "choose from glb, gltf": {"format": "docx"},
     "ca. 1893": {"date": "ca. 1893"},
-    "'superb' is not one of": {"quality": "superb"},
+    "unknown value 'superb'": {"quality": "superb"},
     "none beside light": {"effect": "none light"},
 }
 

@@ -10,7 +10,6 @@ import pytest
 from PIL import Image
 
 from fig2mesh.commands.main import main
-from fig2mesh.settings import PRESETS, STAGES
 from tests.drawn import DrawnFiles, write_figure
 
 HEAVY = ("torch", "open3d", "numpy", "scipy", "numba", "pymeshlab", "trimesh", "pxr")
@@ -139,12 +138,6 @@ def test_validate_finds_damage(tmp_path: Path, capfd: pytest.CaptureFixture[str]
     broken.write_bytes(b"glTF but not really")
     assert main(["validate", str(broken)]) == 2
     assert "broken.glb" in "".join(capfd.readouterr())
-
-
-def test_stage_names_of_the_help_are_the_pipelines() -> None:
-    from fig2mesh.convert.pipeline import steps
-
-    assert [step.name for step in steps(PRESETS["draft"], 1.79)] == list(STAGES)
 
 
 def test_profiles_of_the_help_are_those_of_the_writers() -> None:

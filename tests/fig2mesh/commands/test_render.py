@@ -74,8 +74,8 @@ def test_depth_of_a_drawing_makes_no_texture(
     def broken(*_: object, **__: object) -> None:
         raise AssertionError("colours were looked for")
 
-    monkeypatch.setattr("fig2mesh.convert.pipeline.make_sources", broken)
-    monkeypatch.setattr("fig2mesh.convert.pipeline.scan", broken)
+    monkeypatch.setattr("fig2mesh.stages.textures.make_sources", broken)
+    monkeypatch.setattr("fig2mesh.stages.cloud.scan", broken)
     report = tmp_path / "a.json"
     assert main(drawing(files, "-o", str(tmp_path / "a.png"), "--mode", "depth", "--report", str(report))) == 0
     counts = json.loads(report.read_text())["counts"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
-from fig2mesh.convert.fields import check_fields, option, request_class
+from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.errors import InputError
 from fig2mesh.settings import Closing, Contours, Mesher, Parts, Quality, Settings, Textures, settings_for
 

@@ -17,7 +17,8 @@ from exporters.georeference import placement_of_tile
 from exporters.inspect import inspect
 from fig2mesh.asset_frame import asset_from_figure, foot_on_picture, height_on_picture, on_drawing
 from fig2mesh.commands.main import main
-from fig2mesh.convert.place import PlaceRequest, clamp_note, open_map, place
+from fig2mesh.conversion.place import clamp_note, open_map, place
+from fig2mesh.conversion.request import PlaceRequest
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import clean
@@ -182,7 +183,7 @@ def asked(sheet: Path | None, **more: Any) -> PlaceRequest:
             "height_m": None,
             "altitude": 0.0,
             "altitude_datum": "ellipsoid",
-            "map_sheet": sheet,
+            "map": sheet,
             **more,
         }
     )

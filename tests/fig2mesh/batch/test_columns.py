@@ -1,4 +1,4 @@
-"""Rows as options of the main job."""
+"""Columns of collections as fields of requests."""
 
 from __future__ import annotations
 
@@ -6,30 +6,44 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import click
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fig2mesh.batch.row_options import OURS, defaults_of, is_known, known_columns, options_of
-from fig2mesh.batch.row_request import FORMATS
-from fig2mesh.commands.main import make
+from fig2mesh.batch.collections.rows import Row
+from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column, is_known, request_of, shared_fields
+from fig2mesh.batch.task import Task
+from fig2mesh.batch.tasks import FORMATS, make_task
+from fig2mesh.commands.options import request_options
+from fig2mesh.conversion.fields import request_fields
+from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 
-def test_every_option_of_the_main_job_is_a_column_or_ours() -> None:
-    names = {max(p.opts, key=len).lstrip("-") for p in make.params if isinstance(p, click.Option)}
-    assert {name.replace("-", "_") for name in names - set(OURS)} == set(known_columns())
-    assert set(OURS) <= names
-    assert all(is_known(column) for column in (*known_columns(), "figure", "lon", "lat", "x", "y", "date", "format"))
+def task_of(values: dict[str, Any], defaults: dict[str, Any]) -> Task:
+    return make_task(Row(1, "line 2", values), "n", "n", defaults)
+
+
+def test_every_field_of_a_request_is_a_column_or_chosen_by_the_batch() -> None:
+    names = {field.name for field in request_fields(Request)}
+    chosen = {"output", "overwrite", "save_stages", "resume_from", "report", "tiles_version", "visible_from"}
+    assert names - chosen - {"figure"} == set(fields_by_column())
+    assert chosen <= names
+    assert all(is_known(column) for column in (*fields_by_column(), *OWN_COLUMNS))
     assert not is_known("artist")
 
 
 @given(st.floats(-180, 180), st.floats(-90, 90), st.integers(200, 2_000_000), st.floats(0.5, 100))
 def test_values_arrive_as_on_the_command_line(lon: float, lat: float, triangles: int, height: float) -> None:
-    row = {"figure": "a.png", "lon": lon, "lat": lat, "triangles": triangles, "height_m": height}
+    import click
+
+    found: list[Request] = []
+    command = click.command()(request_options(Request)(found.append))
     words = ["a.png", "--lonlat", repr(lon), repr(lat), "--triangles", str(triangles), "--height-m", repr(height)]
-    assert options_of(row, {}, "n").values == make.make_context("row", [*words, "--name", "n"]).params
+    assert CliRunner().invoke(command, [*words, "--name", "n"]).exit_code == 0
+    row = {"figure": "a.png", "lon": lon, "lat": lat, "triangles": triangles, "height_m": height}
+    assert found == [request_of(row, {}, "n")]
 
 
 @pytest.mark.parametrize(
@@ -46,13 +60,13 @@ def test_values_arrive_as_on_the_command_line(lon: float, lat: float, triangles:
         ("seed", 7.0, "seed", 7),
         ("height_m", "2.5", "height_m", 2.5),
         ("mask", "m.png", "mask", Path("m.png")),
-        ("map", "sheet.tif", "map_sheet", Path("sheet.tif")),
+        ("map", "sheet.tif", "map", Path("sheet.tif")),
         ("credit", "-not an option", "credit", "-not an option"),
         ("facing", "NE", "facing", "NE"),
     ],
 )
 def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: Any) -> None:
-    assert options_of({"figure": "a.png", column: value}, {}, "n").values[parameter] == expected
+    assert getattr(request_of({"figure": "a.png", column: value}, {}, "n"), parameter) == expected
 
 
 @pytest.mark.parametrize(
@@ -63,9 +77,12 @@ def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: A
         ({"figure": "a", "y": 8.0}, "column x: is empty; give both x and y"),
         ({"figure": "a", "lon": 1, "lat": 2, "lonlat": "1 2"}, "column lonlat: beside lon and lat; give it once"),
         ({"figure": "a", "lonlat": "1"}, "column lonlat: 1 values; give 2: LON LAT"),
-        ({"figure": "a", "quality": "superb"}, "column quality: 'superb' is not one of"),
-        ({"figure": "a", "triangles": "many"}, "column triangles: 'many' is not a valid integer"),
-        ({"figure": "a", "seed": -1}, "column seed: -1 is not in the range"),
+        (
+            {"figure": "a", "quality": "superb"},
+            "column quality: unknown value 'superb'; choose from draft",
+        ),
+        ({"figure": "a", "triangles": "many"}, "column triangles: 'many' is not a whole number"),
+        ({"figure": "a", "seed": -1}, "column seed: -1 is out of range"),
         ({"figure": "a", "evidence": "maybe"}, "column evidence: 'maybe'; give true or false"),
         ({"figure": "a", "output": "b.glb"}, "column output: is chosen by the batch; remove the column"),
         ({"figure": "a", "overwrite": True}, "column overwrite: is chosen by the batch"),
@@ -74,48 +91,45 @@ def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: A
 )
 def test_what_is_wrong_is_said_of_the_column(row: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as caught:
-        options_of(row, {}, "n")
+        request_of(row, {}, "n")
     assert str(caught.value).startswith(message)
     assert "\n" not in str(caught.value)
 
 
 def test_a_row_goes_before_the_defaults() -> None:
     defaults = {"quality": "fine", "map": "/sheet.tif", "effect": ("none",), "seed": 3}
-    bare = options_of({"figure": "a", "x": 1, "y": 2}, defaults, "n").values
-    assert (bare["quality"], bare["map_sheet"], bare["effects"], bare["at"]) == (
-        "fine",
-        Path("/sheet.tif"),
-        ("none",),
-        (1.0, 2.0),
-    )
-    own = options_of({"figure": "a", "lon": 1, "lat": 2, "quality": "draft", "effect": "light"}, defaults, "n").values
-    assert (own["quality"], own["map_sheet"], own["effects"], own["seed"]) == ("draft", None, ("light",), 3)
-    other = options_of({"figure": "a", "map": "other.tif"}, {"lonlat": (1.0, 2.0)}, "n").values
-    assert (other["lonlat"], other["map_sheet"]) == (None, Path("other.tif"))
+    bare = request_of({"figure": "a", "x": 1, "y": 2}, defaults, "n")
+    assert (bare.quality, bare.map, bare.effects, bare.at) == ("fine", Path("/sheet.tif"), ("none",), (1.0, 2.0))
+    own = request_of({"figure": "a", "lon": 1, "lat": 2, "quality": "draft", "effect": "light"}, defaults, "n")
+    assert (own.quality, own.map, own.effects, own.seed) == ("draft", None, ("light",), 3)
+    other = request_of({"figure": "a", "map": "other.tif"}, {"lonlat": (1.0, 2.0)}, "n")
+    assert (other.lonlat, other.map) == (None, Path("other.tif"))
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_format_and_date_of_the_command_line_hold_for_rows_without(suffix: str) -> None:
-    bare = options_of({"figure": "a"}, {"format": (suffix,), "date": "1893"}, "n")
+    bare = task_of({"figure": "a"}, {"format": (suffix,), "date": "1893"})
     assert (bare.formats, bare.date) == ((suffix,), "1893")
-    own = options_of({"figure": "a", "format": "ply", "date": 1895}, {"format": (suffix,), "date": "1893"}, "n")
+    own = task_of({"figure": "a", "format": "ply", "date": 1895}, {"format": (suffix,), "date": "1893"})
     assert (own.formats, own.date) == (("ply",), "1895")
-    assert bare.values == options_of({"figure": "a"}, {}, "n").values
+    assert bare.request == task_of({"figure": "a"}, {}).request
 
 
 def test_what_is_no_option_is_an_attribute() -> None:
-    found = options_of({"figure": "a", "artist": "Anna", "year": 1893, "date": 1893, "format": "usdz ply"}, {}, "n")
+    found = task_of({"figure": "a", "artist": "Anna", "year": 1893, "date": 1893, "format": "usdz ply"}, {})
     assert found.attributes == {"artist": "Anna", "year": 1893}
     assert (found.date, found.formats) == ("1893", ("usdz", "ply"))
 
 
 def test_options_of_one_figure_are_no_defaults() -> None:
-    names = {option.name for option in defaults_of(make)}
-    assert {"quality", "map_sheet", "facing", "height_m", "credit"} <= names
-    assert not names & {"name", "bbox", "mask", "keypoints", "lonlat", "at", "outputs", "overwrite"}
+    names = {field.name for field in shared_fields()}
+    assert {"quality", "map", "facing", "height_m", "credit"} <= names
+    assert not names & {"name", "bbox", "mask", "keypoints", "lonlat", "at", "output", "overwrite"}
 
 
-@given(st.dictionaries(st.sampled_from(known_columns()), st.text() | st.floats() | st.integers() | st.booleans()))
+@given(
+    st.dictionaries(st.sampled_from(list(fields_by_column())), st.text() | st.floats() | st.integers() | st.booleans())
+)
 def test_any_values_are_taken_or_refused(values: dict[str, Any]) -> None:
     with suppress(InputError):
-        assert options_of({"figure": "a.png", **values}, {}, "n").values["figure"] == Path("a.png")
+        assert request_of({"figure": "a.png", **values}, {}, "n").figure == Path("a.png")

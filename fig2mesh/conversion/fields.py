@@ -31,6 +31,7 @@ class Option:
     metavar : stands for the value in the help; "" where the type tells
     low, high : limits of a number, inclusive
     default_text : shown as the default, where the field's own default does not tell
+    negative : name of the option that turns a truth value off, where it is not --no-NAME
     argument : whether it is a positional argument of the command line
     column : whether a row of a collection can have it
     shared : whether one value can hold for all rows of a collection
@@ -43,6 +44,7 @@ class Option:
     low: float | None = None
     high: float | None = None
     default_text: str = ""
+    negative: str = ""
     argument: bool = False
     column: bool = True
     shared: bool = True
@@ -98,7 +100,7 @@ class RequestField:
 
 
 @functools.cache
-def request_fields(request: type) -> tuple[RequestField, ...]:
+def request_fields(request: Any) -> tuple[RequestField, ...]:
     """Fields of a request in the order in which they are defined, those of its base classes first."""
     hints = get_type_hints(request)
     found = []
@@ -125,7 +127,7 @@ def _type_of(hint: Any) -> FieldType:
     return FieldType(hint)
 
 
-def check_fields(request: object) -> None:
+def check_fields(request: Any) -> None:
     """Bring the fields of a request to their types, paths given as text included, and check their values.
 
     Raises InputError naming the option.
@@ -161,8 +163,8 @@ def _item(field: RequestField, value: Any) -> Any:
         raise _unexpected(field, value)
     if field.type.choices and value not in field.type.choices:
         raise InputError(field.flag, f"unknown value {value!r}", f"choose from {', '.join(field.type.choices)}")
-    low, high = field.option.low, field.option.high
-    if (low is not None and not value >= low) or (high is not None and not value <= high):
+    low, high, number = field.option.low, field.option.high, cast(float, value)
+    if (low is not None and not number >= low) or (high is not None and not number <= high):
         raise InputError(field.flag, f"{value} is out of range", f"give a value {_range(low, high)}")
     return value
 
@@ -182,3 +184,64 @@ def _range(low: float | None, high: float | None) -> str:
     if low is None:
         return f"of at most {high:g}"
     return f"of at least {low:g}" if high is None else f"between {low:g} and {high:g}"
+
+
+def parse_value(field: RequestField, raw: object, source: str) -> Any:
+    """A field's value from a cell of a table: a text, a number, a truth value, or a tuple of these.
+
+    Items of a list in a text are separated by spaces, commas or semicolons. source : named in messages
+
+    Raises InputError.
+    """
+    if field.type.many or field.type.count > 1:
+        items = _listed(raw)
+        if field.type.count > 1 and len(items) != field.type.count:
+            raise InputError(source, f"{len(items)} values", f"give {field.type.count}: {field.option.metavar}")
+        return tuple(_parse_item(field, item, source) for item in items)
+    return _parse_item(field, raw, source)
+
+
+def _parse_item(field: RequestField, raw: object, source: str) -> Any:
+    kind, text = field.type.kind, _text(raw)
+    if kind is bool:
+        return _truth(raw, source)
+    if kind is Path:
+        return Path(text)
+    if kind is str:
+        return text
+    try:
+        return kind(text)
+    except ValueError:
+        name = "a whole number" if kind is int else "a number"
+        raise InputError(source, f"{text[:40]!r} is not {name}", f"give {name}") from None
+
+
+def _listed(raw: object) -> list[str]:
+    if isinstance(raw, tuple | list):
+        return [_text(item) for item in raw]
+    return _text(raw).replace(",", " ").replace(";", " ").split()
+
+
+def _text(raw: object) -> str:
+    if isinstance(raw, float) and raw.is_integer() and abs(raw) < 2**53:
+        return str(int(raw))  # tables keep whole numbers as floats, where one of them is missing
+    return repr(raw) if isinstance(raw, float) else str(raw)
+
+
+def _truth(raw: object, source: str) -> bool:
+    text = str(raw).strip().lower()
+    if text in ("1", "1.0", "true", "yes", "on"):
+        return True
+    if text in ("0", "0.0", "false", "no", "off"):
+        return False
+    raise InputError(source, f"{text[:40]!r}", "give true or false")
+
+
+def as_plain(request: Any) -> dict[str, Any]:
+    """Fields of a request that differ from their defaults, as JSON holds them; the class takes them as arguments."""
+    found = {}
+    for field in request_fields(type(request)):
+        value = getattr(request, field.field)
+        if value != field.default:
+            found[field.field] = str(value) if isinstance(value, Path) else value
+    return found

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from fig2mesh.convert.record_file import read_record, write_record
+from fig2mesh.conversion.record_file import read_record, write_record
 from fig2mesh.errors import FigureError, InputError, OutputError
 from fig2mesh.stages.stage import Kept, Stage
 

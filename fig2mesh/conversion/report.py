@@ -12,8 +12,9 @@ from exporters.file_digest import sha256_of
 from exporters.sampling import observed_shares
 from fig2mesh import __version__
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
-from fig2mesh.convert.convert import Conversion
-from fig2mesh.convert.observer import Observer
+from fig2mesh.conversion.convert import Conversion
+from fig2mesh.conversion.observer import Observer
+from fig2mesh.counters import Work
 from fig2mesh.image_frame import image_frame
 from fig2mesh.libraries import PACKAGES, version
 from fig2mesh.measure.model import front_similarity, shape_measures, silhouette_iou
@@ -25,7 +26,7 @@ from fig2mesh.stages.solid import solid
 
 
 def make_report(
-    done: Conversion, outputs: Sequence[Path], observer: Observer, counts: Mapping[str, int]
+    done: Conversion, outputs: Sequence[Path], observer: Observer, counts: Mapping[Work, int]
 ) -> dict[str, Any]:
     """What `--report` says of a conversion and the files written; these and the inputs with their digests.
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from exporters.errors import DAMAGE
-from fig2mesh.convert.record_types import check_fields, fits, records_in
+from fig2mesh.conversion.record_types import check_fields, fits, records_in
 from fig2mesh.errors import FigureError
 from georef.untrusted.json_file import parse_json
 from georef.untrusted.npz_file import read_arrays, text_of

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from exporters.asset import Asset
 from exporters.write import has_levels
-from fig2mesh.convert.asset import asset_of
-from fig2mesh.convert.keys import figure_digest
-from fig2mesh.convert.observer import Observer
-from fig2mesh.convert.place import Placed, open_map, place
-from fig2mesh.convert.plan import Plan, normals_of, plan
-from fig2mesh.convert.request import HEIGHT_M, Request
-from fig2mesh.convert.runner import Inputs, Results, Runner
-from fig2mesh.convert.stores import FolderStore, NoStore, Store
+from fig2mesh.conversion.asset import asset_of
+from fig2mesh.conversion.keys import figure_digest
+from fig2mesh.conversion.observer import Observer
+from fig2mesh.conversion.place import Placed, open_map, place
+from fig2mesh.conversion.plan import Plan, normals_of, plan
+from fig2mesh.conversion.request import HEIGHT_M, Request
+from fig2mesh.conversion.runner import Inputs, Results, Runner
+from fig2mesh.conversion.stores import FolderStore, NoStore, Store
 from fig2mesh.errors import InputError
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import CleanFigure, clean
@@ -133,7 +133,7 @@ def convert(
     Raises
     ------
     FigureError, InputError : a file or a value cannot be used; see `fig2mesh.parse.read.read_figure` and
-        `fig2mesh.convert.place.open_map`
+        `fig2mesh.conversion.place.open_map`
     """
     observer = observer or Observer()
     check_stages(request)

@@ -8,9 +8,9 @@ from itertools import product
 import pytest
 
 from fig2mesh.commands.main import main
-from fig2mesh.convert.pipeline import steps
-from fig2mesh.convert.plan import plan
-from fig2mesh.settings import STAGES, settings_for
+from fig2mesh.conversion.plan import plan
+from fig2mesh.settings import settings_for
+from fig2mesh.stages.table import STAGES
 
 
 @pytest.mark.parametrize(
@@ -20,8 +20,11 @@ from fig2mesh.settings import STAGES, settings_for
 def test_the_pipeline_runs_what_is_planned(mesher: str, textures: str, parts: str) -> None:
     settings = settings_for("draft", mesher=mesher, textures=textures, parts=parts)
     planned = plan(settings, ["a.glb"])
-    assert tuple(stage.name for stage in planned.stages) == STAGES
-    assert [stage.name for stage in planned.stages if stage.runs] == [step.name for step in steps(settings, 1.79)]
+    assert [stage.name for stage in planned.stages] == [stage.name for stage in STAGES]
+    assert [stage.runs for stage in planned.stages] == [stage.left_out(settings) is None for stage in STAGES]
+    runs = {stage.name: stage.runs for stage in planned.stages}
+    assert runs["cloud"] == (mesher == "ball-pivot")
+    assert runs["unwrap"] == runs["textures"] == runs["bake"] == (textures != "none")
     assert all(each.why for each in (*planned.stages, *planned.effects))
 
 
@@ -54,7 +57,7 @@ def test_the_command_reads_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert "skip  bake      no texture is asked for" in lines
     assert main(["plan", "no-such-figure.png", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert {stage["name"] for stage in found["stages"] if stage["runs"]} == set(STAGES)
+    assert {stage["name"] for stage in found["stages"] if stage["runs"]} == {stage.name for stage in STAGES}
 
 
 def test_effects_that_exclude_each_other(capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar, cast
 
-from fig2mesh.convert.keys import figure_digest, key_of, stage_keys
-from fig2mesh.convert.observer import Observer
-from fig2mesh.convert.stores import NoStore, Store
+from fig2mesh.conversion.keys import figure_digest, key_of, stage_keys
+from fig2mesh.conversion.observer import Observer
+from fig2mesh.conversion.stores import NoStore, Store
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings
 from fig2mesh.stages.stage import Stage
@@ -45,9 +45,13 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Results:
-    """Results of stages: `results[lift]` is what the stage function `lift` returned, with its type."""
+    """Results of stages: `results[lift]` is what the stage function `lift` returned, with its type.
+
+    keys : key of each result; none where there is no store
+    """
 
     values: Mapping[str, object]
+    keys: Mapping[str, str]
 
     def __getitem__(self, stage: Callable[..., T]) -> T:
         return cast(T, self.values[stage.__name__])
@@ -103,4 +107,4 @@ class Runner:
             with self.observer.work(stage.name, stage.why(self.settings)):
                 results[stage.name] = stage.run(self.settings, results)
             self.store.save(stage, keys.get(stage.name, ""), results[stage.name])
-        return Results(results)
+        return Results(results, keys)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.convert.request import HEIGHT_M, PlaceRequest
+from fig2mesh.conversion.request import HEIGHT_M, PlaceRequest
 from fig2mesh.errors import InputError
 from georef.bearing import parse_facing
 from georef.heights import ellipsoidal_height

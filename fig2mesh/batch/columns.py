@@ -1,0 +1,111 @@
+"""Columns of a collection as fields of requests.
+
+Every field of `fig2mesh.conversion.request.Request` is a column under its option's name, but for those that the batch
+chooses itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from fig2mesh.batch.collections.rows import Value
+from fig2mesh.conversion.fields import RequestField, parse_value, request_fields
+from fig2mesh.conversion.request import Request
+from fig2mesh.errors import InputError
+
+PAIRS = {"lonlat": ("lon", "lat"), "at": ("x", "y")}
+"""Fields of two numbers, and the columns of one number each that make them."""
+
+OWN_COLUMNS = ("figure", "format", "date", *(column for pair in PAIRS.values() for column in pair))
+"""Columns that are not options of the main job."""
+
+
+@cache
+def fields_by_column() -> dict[str, RequestField]:
+    """Field of each column that is an option of the main job."""
+    fields = request_fields(Request)
+    return {field.name: field for field in fields if field.option.column and not field.option.argument}
+
+
+@cache
+def _refused() -> frozenset[str]:
+    return frozenset(field.name for field in request_fields(Request) if not field.option.column)
+
+
+def shared_fields() -> list[RequestField]:
+    """Fields of which one value, given on the command line, can hold for all rows."""
+    return [field for field in fields_by_column().values() if field.option.shared]
+
+
+def is_known(column: str) -> bool:
+    """Whether a column is an option or one of `OWN_COLUMNS`; else it is an attribute."""
+    return column in OWN_COLUMNS or column in fields_by_column()
+
+
+def request_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: str) -> Request:
+    """What a row asks for.
+
+    values : by column; defaults : by column, where the row has none; name : of the figure
+
+    Raises InputError naming the column.
+    """
+    for column in values:
+        if column in _refused():
+            raise InputError(f"column {column}", "is chosen by the batch", "remove the column")
+    fields = fields_by_column()
+    found = _without_other_place({column: defaults[column] for column in defaults if column in fields}, values)
+    found |= {
+        column: parse_value(fields[column], value, f"column {column}")
+        for column, value in values.items()
+        if column in fields
+    }
+    found |= _pairs(values)
+    if "figure" not in values:
+        raise InputError("column figure", "is empty", "name the picture of the figure")
+    given = {fields[column].field: value for column, value in found.items()}
+    try:
+        return Request(**given | {"figure": str(values["figure"]), "name": name})
+    except InputError as error:
+        raise InputError(_column_of(error.source), error.finding, error.remedy) from None
+
+
+def list_of(value: Any) -> tuple[str, ...]:
+    """Items of a list, or of a text in which spaces, commas or semicolons separate them."""
+    if isinstance(value, tuple | list):
+        return tuple(map(str, value))
+    return tuple(str(value).replace(",", " ").replace(";", " ").split())
+
+
+def attributes_of(values: Mapping[str, Value]) -> dict[str, Value]:
+    """What a row says besides."""
+    return {column: value for column, value in values.items() if not (is_known(column) or column in _refused())}
+
+
+def _pairs(values: Mapping[str, Value]) -> dict[str, Any]:
+    found = {}
+    for name, pair in PAIRS.items():
+        given = [values[column] for column in pair if column in values]
+        if len(given) == 1:
+            missing = pair[1] if pair[0] in values else pair[0]
+            raise InputError(f"column {missing}", "is empty", f"give both {pair[0]} and {pair[1]}")
+        if given:
+            if name in values:
+                raise InputError(f"column {name}", f"beside {pair[0]} and {pair[1]}", "give it once")
+            found[name] = parse_value(fields_by_column()[name], tuple(given), f"column {pair[0]}")
+    return found
+
+
+def _without_other_place(defaults: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
+    """The defaults without a place of the other kind than the row's: a row says it better."""
+    if "lonlat" in values or "lon" in values or "lat" in values:
+        return {column: value for column, value in defaults.items() if column not in ("map", "at")}
+    if "map" in values:
+        return {column: value for column, value in defaults.items() if column != "lonlat"}
+    return defaults
+
+
+def _column_of(source: str) -> str:
+    """What a message names: an option becomes the column of its name."""
+    return f"column {source[2:].replace('-', '_')}" if source.startswith("--") else source
