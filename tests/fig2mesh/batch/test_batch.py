@@ -15,7 +15,7 @@ from typing import Any
 
 import pystac
 import pytest
-from fig2mesh.batch.row_request import FORMATS
+from fig2mesh.batch.tasks import FORMATS
 
 from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR
 from exporters.validate import validate

@@ -149,7 +149,7 @@ def test_a_worker_of_another_version_is_refused(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("fig2mesh.batch.keys.fingerprint", lambda: "another")
+    monkeypatch.setattr("fig2mesh.conversion.keys.fingerprint", lambda: "another")
     words = ["batch", str(collection), "-o", str(tmp_path / "out"), "--engine", "dask", "--address", cluster.address]
     assert main(words) == 2
     assert "has another version of fig2mesh or of a library; install the same versions there" in capsys.readouterr().err
