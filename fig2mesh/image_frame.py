@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT
 from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 WIDEST = 3.0

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fig2mesh.errors import InputError
+from fig2mesh.skeleton import KINDS
 
 if TYPE_CHECKING:
     from fig2mesh.training.bodies.pack import Pack
 
-KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
-"""`fig2mesh.skeleton.KINDS`, again, because that imports NumPy."""
 
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
 """Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""

@@ -19,7 +19,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from fig2mesh.nets import weights
-from fig2mesh.records import JOINT_NAMES, PART_NAMES
+from fig2mesh.skeleton import JOINT_NAMES, PART_NAMES
 
 INPUT: Final = 192
 """Pixels a side of the picture that goes in; other multiples of 32 work, at other sizes of figures than trained on."""

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import FILTERS, Hourglass
-from fig2mesh.records import BODY_PARTS
+from fig2mesh.skeleton import BODY_PARTS
 
 PARTS: Final = len(BODY_PARTS)
 

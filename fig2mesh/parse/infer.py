@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from fig2mesh.parse.joints import decode, doubts, visible_inside
 from fig2mesh.parse.silhouette import refine
-from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, FloatArray
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import BoolArray, ByteArray, FloatArray
+from fig2mesh.skeleton import JOINT_MIRROR, PART_MIRROR, PART_NAMES
 
 ROOM: Final = 0.12
 """Space round the figure in the second look, share of its size."""
@@ -24,10 +24,6 @@ PLAIN_RIM: Final = 0.7
 
 FINEST: Final = 320
 """Cells a side in which part labels are told apart; the network's own are a third as fine."""
-
-PART_MIRROR: Final = tuple(
-    PART_NAMES.index({"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]) for name in PART_NAMES
-)
 
 REMEDY: Final = "look at what `fig2mesh parse` writes, correct keypoints.json or mask.png, and pass them"
 

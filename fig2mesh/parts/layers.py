@@ -19,7 +19,8 @@ from fig2mesh.parts.profile import Profile, measure_profile
 from fig2mesh.parts.props import prop_depth
 from fig2mesh.parts.rim import RIM_BLUR, extended, rim_distance
 from fig2mesh.parts.split import Layer, Split, closing
-from fig2mesh.records import JOINT, PART, PART_NAMES, PartSdf
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import JOINT, PART, PART_NAMES
 
 LOAD = {"torso": 0.95, "head": 3.0, "garment": 1.1, "foot": 2.2, "limb": 2.0}
 """Right-hand side of the inflation by kind of part: 2 makes a strip as deep as wide, 1 about 0.7 times; a torso is

@@ -19,8 +19,8 @@ from fig2mesh.field.distance import grid_distance
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.split import Split
-from fig2mesh.records import BODY_PARTS, PART, BoolArray, FloatArray, PartSdf, Pose3D
-from fig2mesh.skeleton import KINDS, PART_KIND, anchor_joints, part_centre
+from fig2mesh.records import BoolArray, FloatArray, PartSdf, Pose3D
+from fig2mesh.skeleton import BODY_PARTS, KINDS, PART, PART_KIND, anchor_joints, part_centre
 
 if TYPE_CHECKING:
     from fig2mesh.nets.disn import Disn

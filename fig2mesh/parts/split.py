@@ -15,15 +15,19 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.parts.limbs import LIMBS, STOUT, Limb, complete, make_limb, measure, stoutness
+from fig2mesh.parts.limbs import STOUT, Limb, complete, make_limb, measure, stoutness
 from fig2mesh.parts.owners import owners
 from fig2mesh.parts.props import find_props
-from fig2mesh.records import JOINT, PART, BoolArray
+from fig2mesh.records import BoolArray
+from fig2mesh.skeleton import JOINT, LIMBS, PART
 
 LAYERED_SHARE = 0.22
 """Limbs with a larger share of their length against something else become layers of their own."""
 
 HEAD_RADIUS_MIN = 0.05
+
+LEGS_FIRST = sorted(LIMBS, key=lambda limb: limb.endswith("arm"))
+"""Limbs in the order in which they are measured and claim their layers."""
 
 CLOTHED = 4
 """Circles of a leg that cloth covers before the rest of the leg becomes a layer of its own that comes out of it."""
@@ -165,7 +169,7 @@ def _measured_limbs(
     body: NDArray[np.float64],
     points: NDArray[np.float64],
 ) -> list[Limb]:
-    limbs = [make_limb(name, joints, visible) for name in LIMBS]
+    limbs = [make_limb(name, joints, visible) for name in LEGS_FIRST]
     bones = [_chain_distance(limb, points) for limb in limbs]
     measured = []
     for index, limb in enumerate(limbs):

@@ -22,7 +22,8 @@ from fig2mesh.nets.head_hsv import HeadHsv, enhance
 from fig2mesh.nets.texture_fill import TextureFill, fill_inputs, sample
 from fig2mesh.nets.uv_unet import UvUnet, infer_uv
 from fig2mesh.nets.view_refine import ViewRefine, refine
-from fig2mesh.records import PART, Pose3D
+from fig2mesh.records import Pose3D
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.sides import Sides, look_around
 from fig2mesh.texture.space import inwards, shown_alike, spread, trust
 from fig2mesh.texture.votes import Unseen

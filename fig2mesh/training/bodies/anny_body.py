@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError
-from fig2mesh.records import JOINT_NAMES, PART, _Checked
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import JOINT_NAMES, PART
 from fig2mesh.training.bodies.rig import KEYS, Rig
 
 # fmt: off

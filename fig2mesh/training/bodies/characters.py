@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from fig2mesh.errors import InputError
 from fig2mesh.mesh.simplify import simplify
 from fig2mesh.mesh.topology import check_solid, edge_pairs
-from fig2mesh.records import JOINT_NAMES, PART, PART_NAMES, Mesh
+from fig2mesh.records import Mesh
+from fig2mesh.skeleton import JOINT_NAMES, PART, PART_NAMES
 from fig2mesh.training.bodies.gltf_scene import GltfScene, read_gltf
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, Rig
 from fig2mesh.training.bodies.solidify import Surface, solidify

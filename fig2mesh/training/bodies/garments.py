@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import PART, _Checked
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import PART
 from fig2mesh.training.bodies.anny_body import AnnyBodies, _read_groups
 
 REACH = {"cloth": 0.07, "shoe": 0.05, "hair": 0.16, "hat": 0.20}

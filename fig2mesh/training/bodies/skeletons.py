@@ -16,8 +16,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from fig2mesh.records import JOINT, JOINT_NAMES, _Checked
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR, JOINT_NAMES
 from fig2mesh.training.bodies.rig import KEY, KEYS, T_POSE, PoseSet, Rig, swing
 from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 

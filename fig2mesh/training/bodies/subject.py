@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 from fig2mesh.training.bodies.anny_body import AnnyBodies, random_body
 from fig2mesh.training.bodies.caricature import caricature, draw_proportions
 from fig2mesh.training.bodies.garments import Garment, wear

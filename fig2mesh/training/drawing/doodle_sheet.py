@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.training.drawing.doodle_shapes import CANVAS, Manner, pixel, shapes_of
 from fig2mesh.training.drawing.styles import BRIGHTS, HAIRS, INKS, MAP_TINTS, SKINS
 from fig2mesh.training.drawing.thing_shapes import Thing

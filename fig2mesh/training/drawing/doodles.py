@@ -12,8 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.skeletons import DRAWN, Sampler, Skeletons
 from fig2mesh.training.drawing.doodle_shapes import CANVAS, Manner

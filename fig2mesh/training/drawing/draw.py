@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.background import PLAIN, draw_background
 from fig2mesh.training.drawing.faces import Face, draw_face
 from fig2mesh.training.drawing.marks import Picture, blur, distance, lay, noise, warp

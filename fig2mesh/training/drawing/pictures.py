@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.training.bodies.garments import vertex_normals
 from fig2mesh.training.bodies.subject import Subject
 from fig2mesh.training.drawing.background import draw_background

@@ -15,8 +15,7 @@ import numpy as np
 from fig2mesh.nets import part_size, weights
 from fig2mesh.nets.disn import VARIANTS, Disn, DisnShape
 from fig2mesh.nets.pose_lift import SHIPPED, PoseLift, PoseLiftShape, pose_path, read_pose
-from fig2mesh.records import BODY_PARTS
-from fig2mesh.skeleton import KINDS, PART_KIND
+from fig2mesh.skeleton import BODY_PARTS, KINDS, PART_KIND
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.evaluate.paper import PART_IOU, PART_RMSE, POSE_SCORES, VARIANT_SCORES
 

@@ -20,7 +20,7 @@ from fig2mesh.nets import uv_unet
 from fig2mesh.nets.head_hsv import head_path, read_head
 from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
 from fig2mesh.nets.view_refine import read_refine, refine_path
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
 from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
 from fig2mesh.training.evaluate.as_baked import baked_sides

@@ -29,7 +29,7 @@ from fig2mesh.nets.figure_parser import (
     read_parser,
     save_parser,
 )
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
 from fig2mesh.training.samples.crop_data import KINDS, crops_digest, joined, load_crops
 from fig2mesh.training.samples.crop_views import Viewer

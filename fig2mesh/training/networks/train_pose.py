@@ -19,7 +19,7 @@ import torch
 from torch import Tensor
 
 from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, bone_lengths, lift, pose_path, save_pose
-from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, View
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
 

@@ -27,7 +27,7 @@ from fig2mesh.nets.head_hsv import (
 )
 from fig2mesh.nets.texture_fill import fill_path, read_fill
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine, refine, refine_inputs, refine_path, save_refine
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.networks.loop import Result, run_loop, seeded, write_scores
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.painted import Painter, Sides, painters

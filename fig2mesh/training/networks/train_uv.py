@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, save_uv, uv_inputs, uv_path
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT

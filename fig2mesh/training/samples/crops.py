@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.camera import axes
-from fig2mesh.records import JOINT, JOINT_NAMES, PART
+from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.subject import Subject, draw_subject
 from fig2mesh.training.drawing.background import draw_background

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.records import BODY_PARTS, PART
-from fig2mesh.skeleton import part_centre
+from fig2mesh.skeleton import BODY_PARTS, PART, part_centre
 from fig2mesh.training.bodies.partition import PartTopology
 from fig2mesh.training.bodies.subject import Subject
 from fig2mesh.training.drawing.raster import Raster, coverage, rasterise

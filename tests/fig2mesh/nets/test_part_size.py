@@ -9,8 +9,7 @@ import pytest
 import torch
 
 from fig2mesh.nets.part_size import PartSizeNet, SizeShape, part_size, read_size, save_size, size_path
-from fig2mesh.records import PART, PART_NAMES
-from fig2mesh.skeleton import JOINT_MIRROR, KINDS, part_centre
+from fig2mesh.skeleton import JOINT_MIRROR, KINDS, PART, PART_NAMES, part_centre
 from fig2mesh.training.networks.loop import seeded
 from fig2mesh.training.networks.train_size import mask_extent, read_sizes, train_size
 

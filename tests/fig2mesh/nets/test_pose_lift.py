@@ -11,8 +11,7 @@ import torch
 
 from fig2mesh.errors import InputError
 from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, lift, lift_joints, pose_path, read_pose, save_pose
-from fig2mesh.records import JOINT
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from fig2mesh.training.networks.loop import seeded
 
 SMALL = PoseLiftShape(width=64)

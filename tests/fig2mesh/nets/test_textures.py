@@ -15,7 +15,7 @@ from fig2mesh.nets.hourglass import Hourglass
 from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, read_fill, sample, save_fill
 from fig2mesh.nets.uv_unet import PARTS, UvUnet, UvUnetShape, infer_uv, read_uv, save_uv, uv_inputs
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine, read_refine, refine, save_refine
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.networks.loop import seeded
 
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fig2mesh.image_frame import image_frame
 from fig2mesh.pose.network import lift_by_network, upright
-from fig2mesh.records import JOINT, JOINT_NAMES, Figure
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR, JOINT_NAMES
 from tests.drawn import JOINTS, draw_figure
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError
 from fig2mesh.mesh.topology import check_solid, face_components
-from fig2mesh.records import BODY_PARTS, JOINT, PART, Mesh
+from fig2mesh.records import Mesh
+from fig2mesh.skeleton import BODY_PARTS, JOINT, PART
 from fig2mesh.training.bodies.characters import BONES, HEIGHT, one_region_each, read_character
 from fig2mesh.training.bodies.rig import KEY, KEYS, T_POSE, Rig, bone_rotations, pose
 from fig2mesh.training.bodies.solidify import Winding, solidify

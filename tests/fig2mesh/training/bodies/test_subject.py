@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 from fig2mesh.training.bodies import subject as subject_module
 from fig2mesh.training.bodies.caricature import Proportions, caricature, draw_proportions
 from fig2mesh.training.bodies.rig import Rig

@@ -12,7 +12,7 @@ from fig2mesh.nets.head_hsv import HeadShape, head_path, read_head
 from fig2mesh.nets.texture_fill import fill_path, read_fill
 from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
 from fig2mesh.nets.view_refine import read_refine, refine_path
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
 from fig2mesh.training.networks.train_fill import train_fill
 from fig2mesh.training.networks.train_refine import train_head, train_refine

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from fig2mesh.nets.pose_lift import PoseLiftShape, lift_joints, pose_path, read_pose
-from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, PoseSet, Rig, axis_angle, pose
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sampler, Skeletons
 from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fig2mesh.errors import FigureError
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.bodies import subject as subject_module
 from fig2mesh.training.bodies.pack import save_pack
 from fig2mesh.training.samples import build as build_module

@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, binary_fill_holes, map_coordinates
 
-from fig2mesh.records import BODY_PARTS
-from fig2mesh.skeleton import anchor_joints, part_centre
+from fig2mesh.skeleton import BODY_PARTS, anchor_joints, part_centre
 from fig2mesh.training.bodies.partition import partition
 from fig2mesh.training.bodies.subject import Subject, draw_subject
 from fig2mesh.training.samples import sample as samples
