@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+FIGURE_HEIGHT: Final = 1.79
+"""Height of every figure, units (and metres unless asked otherwise); paper §4.1, "uniformly to 1.79m"."""
+
 SIDES: Final = ("l", "r")
 
 # fmt: off

