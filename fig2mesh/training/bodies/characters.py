@@ -20,12 +20,11 @@ from fig2mesh.errors import InputError
 from fig2mesh.mesh.simplify import simplify
 from fig2mesh.mesh.topology import check_solid, edge_pairs
 from fig2mesh.records import Mesh
-from fig2mesh.skeleton import JOINT_NAMES, PART, PART_NAMES
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT_NAMES, PART, PART_NAMES
 from fig2mesh.training.bodies.gltf_scene import GltfScene, read_gltf
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, Rig
 from fig2mesh.training.bodies.solidify import Surface, solidify
 
-HEIGHT = 1.79
 """Height of every character, hat and hair included, FIGURE units."""
 
 # fmt: off
@@ -96,7 +95,7 @@ def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> t
 
 # ---------------------------------------------------------------- reading
 def read_soup(path: Path) -> Soup:
-    """Every skinned triangle of a character file in rest pose, scaled to `HEIGHT`."""
+    """Every skinned triangle of a character file in rest pose, scaled to `FIGURE_HEIGHT`."""
     scene = read_gltf(path)
     names, parents, bone_of = _skeleton(scene, path)
     placed = scene.global_matrices()
@@ -137,7 +136,7 @@ def read_soup(path: Path) -> Soup:
         raise InputError(path.name, "it holds no skinned mesh", "give a character, not an animation file")
     shape = np.concatenate(corners)
     real = np.linalg.norm(np.cross(shape[:, 1] - shape[:, 0], shape[:, 2] - shape[:, 0]), axis=1) > 1e-12
-    scale = HEIGHT / np.ptp(shape[..., 1])
+    scale = FIGURE_HEIGHT / np.ptp(shape[..., 1])
     linear = np.array(list(found.values()))
     srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return Soup(
