@@ -50,14 +50,14 @@ def _filters() -> tuple[str, bool, str]:
 
 def _weights() -> tuple[str, bool, str]:
     try:
-        from fig2mesh.nets import figure_parser, part_size, pose_lift, weights
+        from fig2mesh.nets import disn, figure_parser, part_size, pose_lift, weights
         from fig2mesh.skeleton import KINDS
 
-        figure_parser.load()
-        pose_lift.load()
+        figure_parser.PARSER_WEIGHTS.shipped(figure_parser.SHIPPED)
+        pose_lift.POSE_WEIGHTS.shipped(pose_lift.SHIPPED)
         for kind in KINDS:
-            part_size.load(kind)
-            weights.load(kind)
+            part_size.SIZE_WEIGHTS.shipped(part_size.SizeShape(kind))
+            disn.PART_WEIGHTS.shipped(disn.DisnShape(kind))
     except Exception as error:
         return "weights", False, " ".join(str(error).split())[:200]
     megabytes = sum(path.stat().st_size for path in weights.FOLDER.glob("*.safetensors")) / 1e6

@@ -123,8 +123,9 @@ def look(rgb: ByteArray, centre: NDArray[np.floating], edge: float) -> Look:
     low = np.asarray(centre, float) - edge / 2
     picture = square(rgb, low, edge, figure_parser.INPUT).astype(np.float32) / 255
     batch = torch.from_numpy(np.stack([picture, picture[:, ::-1]]).transpose(0, 3, 1, 2).copy())
+    net = figure_parser.PARSER_WEIGHTS.shipped(figure_parser.SHIPPED)
     with torch.inference_mode():
-        found = figure_parser.load()(batch.contiguous(memory_format=torch.channels_last))
+        found = net(batch.contiguous(memory_format=torch.channels_last))
     likely = found.silhouette.sigmoid().numpy()
     labels = found.labels.softmax(dim=1).numpy()
     heat = found.heat.flatten(2).softmax(dim=2).reshape(found.heat.shape).numpy()

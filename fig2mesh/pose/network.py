@@ -22,11 +22,11 @@ WEIGHTS = {"head": 0.1, "thorax": 0.45, "pelvis": 0.45}
 
 def lift_by_network(figure: Figure, frame: ImageFrame) -> Pose3D:
     """Joints in FIGURE: x and y exactly as drawn, z from the shipped network, 0 at the pelvis."""
-    from fig2mesh.nets.pose_lift import SHIPPED, lift_joints, load
+    from fig2mesh.nets.pose_lift import POSE_WEIGHTS, SHIPPED, lift_joints
 
     count("pose network")
     drawn = np.asarray(frame.figure_from_image(figure.joints_px), np.float32)
-    joints = lift_joints(load(), drawn, figure.visible if SHIPPED.visibility else None)
+    joints = lift_joints(POSE_WEIGHTS.shipped(SHIPPED), drawn, figure.visible if SHIPPED.visibility else None)
     return Pose3D(upright(joints))
 
 

@@ -61,9 +61,10 @@ class TextureNets:
 
 def shipped() -> TextureNets:
     """The networks that come with the package."""
-    from fig2mesh.nets import texture_fill, uv_unet
+    from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
+    from fig2mesh.nets.uv_unet import SHIPPED, UV_WEIGHTS
 
-    return TextureNets(uv_unet.load(), texture_fill.load())
+    return TextureNets(UV_WEIGHTS.shipped(SHIPPED), FILL_WEIGHTS.shipped(FillShape()))
 
 
 def texture_coordinates(sides: Sides, net: UvUnet) -> NDArray[np.float32]:

@@ -25,8 +25,6 @@ from fig2mesh.training.bodies.gltf_scene import GltfScene, read_gltf
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, Rig
 from fig2mesh.training.bodies.solidify import Surface, solidify
 
-"""Height of every character, hat and hair included, FIGURE units."""
-
 # fmt: off
 BONES: dict[str, str] = {
     "hips": "Hips", "spine1": "Abdomen", "spine2": "Torso", "spine3": "Chest", "neck": "Neck", "head": "Head",
@@ -95,7 +93,7 @@ def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> t
 
 # ---------------------------------------------------------------- reading
 def read_soup(path: Path) -> Soup:
-    """Every skinned triangle of a character file in rest pose, scaled to `FIGURE_HEIGHT`."""
+    """Every skinned triangle of a character file in rest pose, scaled to `FIGURE_HEIGHT`, hat and hair included."""
     scene = read_gltf(path)
     names, parents, bone_of = _skeleton(scene, path)
     placed = scene.global_matrices()

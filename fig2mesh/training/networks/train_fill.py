@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, fill_path, sample, save_fill
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, fill_inputs, sample
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT
@@ -107,7 +107,7 @@ def train_fill(
         "samples": result.samples,
         "scores": found,
     }
-    save_fill(fill_path(out), net, facts)
+    FILL_WEIGHTS.save(FILL_WEIGHTS.path(net.shape, out), net, facts)
     return found
 
 

@@ -22,12 +22,10 @@ from fig2mesh.nets.figure_parser import (
     JOINTS,
     LABELS,
     MASK,
+    PARSER_WEIGHTS,
     Depthwise,
     FigureParser,
     Parsed,
-    parser_path,
-    read_parser,
-    save_parser,
 )
 from fig2mesh.skeleton import JOINT
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
@@ -80,7 +78,7 @@ def train_parse(
 
         start_from(net, blazepose)
     if init is not None:
-        net.load_state_dict(read_parser(parser_path(init))[0].state_dict())
+        net.load_state_dict(PARSER_WEIGHTS.read(PARSER_WEIGHTS.path(net.shape, init))[0].state_dict())
         net.requires_grad_(True)
     if not whole:
         for early in (
@@ -146,8 +144,8 @@ def train_parse(
         arguments={"data": facts["data"], "init": None if init is None else init.name, "whole": whole},
     )
     scores = dict(validate())
-    save_parser(
-        parser_path(out),
+    PARSER_WEIGHTS.save(
+        PARSER_WEIGHTS.path(net.shape, out),
         net,
         {
             **facts,

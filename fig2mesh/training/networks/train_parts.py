@@ -18,9 +18,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from fig2mesh.nets import weights
 from fig2mesh.nets.decode import decode, decode_dense
-from fig2mesh.nets.disn import Disn, DisnShape, as_input
+from fig2mesh.nets.disn import PART_WEIGHTS, Disn, DisnShape, as_input
 from fig2mesh.training.networks.loop import run_loop, seeded
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import MIRROR, VIEWS, PartData, load_parts, swapped, turned, turned_grid
@@ -53,7 +52,7 @@ def train_parts(
 ) -> dict[str, float]:
     """Train one network on the shards in `data`, going on where an earlier call stopped; returns its scores.
 
-    Writes log.csv, curve.png, checkpoint.pt and at last the weights, `weights.disn_path(shape, out)`.
+    Writes log.csv, curve.png, checkpoint.pt and at last the weights, `PART_WEIGHTS.path(shape, out)`.
     budget_min : minutes; epochs : times that each part is seen in each view; whichever ends first
     lr : learning rate, which falls to a hundredth as a cosine
     mask_mix : shares of whole, visible and empty masks
@@ -69,7 +68,7 @@ def train_parts(
     net = seeded(seed, lambda: Disn(shape)).to(device)
     before: dict[str, Any] = {}
     if init is not None:
-        earlier, before = weights.read_disn(weights.disn_path(shape, init))
+        earlier, before = PART_WEIGHTS.read(PART_WEIGHTS.path(shape, init))
         net.load_state_dict(earlier.state_dict())
     optimizer = torch.optim.Adam(net.parameters(), lr=lr, fused=True)
 
@@ -123,7 +122,7 @@ def train_parts(
         "samples": before.get("samples", 0) + result.samples,
         "scores": scores,
     }
-    weights.save_disn(weights.disn_path(shape, out), net, facts)
+    PART_WEIGHTS.save(PART_WEIGHTS.path(shape, out), net, facts)
     return {**result.metrics, **scores}
 
 

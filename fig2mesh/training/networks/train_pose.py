@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, bone_lengths, lift, pose_path, save_pose
+from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLift, PoseLiftShape, bone_lengths, lift
 from fig2mesh.skeleton import JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, View
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
@@ -117,7 +117,7 @@ def train_pose(
     write_scores(out, scores)
     data = {"poses": len(train.rotations), "bodies": len(train.reach), "augment": augment}
     facts = {"data": data, "seed": seed, "steps": result.steps, "samples": result.samples, "scores": scores}
-    save_pose(pose_path(shape, out), net, facts)
+    POSE_WEIGHTS.save(POSE_WEIGHTS.path(shape, out), net, facts)
     return net, scores
 
 

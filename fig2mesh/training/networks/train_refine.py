@@ -15,18 +15,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.nets.head_hsv import (
-    HeadHsv,
-    HeadShape,
-    disc_value,
-    head_inputs,
-    head_path,
-    head_window,
-    rgb_of,
-    save_head,
-)
-from fig2mesh.nets.texture_fill import fill_path, read_fill
-from fig2mesh.nets.view_refine import RefineShape, ViewRefine, refine, refine_inputs, refine_path, save_refine
+from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadHsv, HeadShape, disc_value, head_inputs, head_window, rgb_of
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
+from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape, ViewRefine, refine, refine_inputs
 from fig2mesh.skeleton import PART
 from fig2mesh.training.networks.loop import Result, run_loop, seeded, write_scores
 from fig2mesh.training.samples.build import recipe_digest
@@ -71,7 +62,7 @@ def train_refine(
         for split, painter in held.items()
         for name, value in refine_scores(net, painter).items()
     }
-    save_refine(refine_path(out), net, _facts(data, len(known), seed, result, found, out))
+    REFINE_WEIGHTS.save(REFINE_WEIGHTS.path(net.shape, out), net, _facts(data, len(known), seed, result, found, out))
     return found
 
 
@@ -104,7 +95,7 @@ def train_head(
     found = {
         f"{split}_{name}": value for split, painter in held.items() for name, value in head_scores(net, painter).items()
     }
-    save_head(head_path(out), net, _facts(data, len(known), seed, result, found, out))
+    HEAD_WEIGHTS.save(HEAD_WEIGHTS.path(net.shape, out), net, _facts(data, len(known), seed, result, found, out))
     return found
 
 
@@ -155,7 +146,7 @@ def head_scores(net: HeadHsv, painter: Painter) -> Scores:
 
 
 def _painters(data: Path, fill: Path) -> tuple[Painter, dict[str, Painter]]:
-    net, _ = read_fill(fill_path(fill))
+    net, _ = FILL_WEIGHTS.read(FILL_WEIGHTS.path(FillShape(), fill))
     known = painters(data, net, ("train",))
     return known, {split: painters(data, net, (split,), 16) for split in HELD_OUT}
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.nets.part_size import OUTPUTS, PartSizeNet, SizeShape, bone_unit, save_size, size_path
+from fig2mesh.nets.part_size import OUTPUTS, SIZE_WEIGHTS, PartSizeNet, SizeShape, bone_unit
 from fig2mesh.records import _Checked
 from fig2mesh.skeleton import MIRRORED, PART_KIND, anchor_joints
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
@@ -169,7 +169,7 @@ def train_size(
         "samples": result.samples,
         "scores": scores,
     }
-    save_size(size_path(kind, out), net, facts)
+    SIZE_WEIGHTS.save(SIZE_WEIGHTS.path(net.shape, out), net, facts)
     return net, scores
 
 

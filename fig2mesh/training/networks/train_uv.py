@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, save_uv, uv_inputs, uv_path
+from fig2mesh.nets.uv_unet import UV_WEIGHTS, UvUnet, UvUnetShape, uv_inputs
 from fig2mesh.skeleton import PART
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
 from fig2mesh.training.samples.build import recipe_digest
@@ -61,7 +61,7 @@ def train_uv(
     net = seeded(seed, lambda: UvUnet(shape)).to(device)
     before: dict[str, Any] = {}
     if init is not None:
-        other, before = read_uv(uv_path(shape, init))
+        other, before = UV_WEIGHTS.read(UV_WEIGHTS.path(shape, init))
         net.load_state_dict(other.state_dict())
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
@@ -112,7 +112,7 @@ def train_uv(
         "samples": before.get("samples", 0) + result.samples,
         "scores": found,
     }
-    save_uv(uv_path(shape, out), net, facts)
+    UV_WEIGHTS.save(UV_WEIGHTS.path(shape, out), net, facts)
     return found
 
 

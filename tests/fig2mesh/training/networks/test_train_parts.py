@@ -8,8 +8,7 @@ import torch
 
 from fig2mesh.errors import InputError
 from fig2mesh.field.camera import axes
-from fig2mesh.nets import weights
-from fig2mesh.nets.disn import Disn, DisnShape
+from fig2mesh.nets.disn import PART_WEIGHTS, Disn, DisnShape
 from fig2mesh.skeleton import KINDS
 from fig2mesh.training.networks.train_parts import draw, evaluate_parts, train_parts
 from fig2mesh.training.samples.part_data import load_parts, mirrored_masks, swapped, turned, turned_grid
@@ -92,10 +91,10 @@ def test_a_batch_is_half_inside(data):
 def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
     shape = DisnShape.of("hand", variant)
     scores = [train_parts(data, "hand", shape, tmp_path / name, seed=5, **SHORT) for name in "ab"]
-    files = [weights.disn_path(shape, tmp_path / name).read_bytes() for name in "ab"]
+    files = [PART_WEIGHTS.path(shape, tmp_path / name).read_bytes() for name in "ab"]
     assert files[0] == files[1]
     assert scores[0]["iou_visible"] == scores[1]["iou_visible"]
-    net, facts = weights.read_disn(weights.disn_path(shape, tmp_path / "a"))
+    net, facts = PART_WEIGHTS.read(PART_WEIGHTS.path(shape, tmp_path / "a"))
     assert facts["steps"] == 6
     assert facts["scores"]["n_amodal"] == 2
     assert net.shape == shape
@@ -127,7 +126,7 @@ def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
         train_parts(data, "foot", shape, tmp_path / "parts", **SHORT)
     monkeypatch.setattr(module, "draw", draw)
     train_parts(data, "foot", shape, tmp_path / "parts", **SHORT)
-    name = weights.disn_path(shape).name
+    name = PART_WEIGHTS.path(shape).name
     assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 

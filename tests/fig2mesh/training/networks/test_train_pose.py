@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from fig2mesh.nets.pose_lift import PoseLiftShape, lift_joints, pose_path, read_pose
+from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLiftShape, lift_joints
 from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, PoseSet, Rig, axis_angle, pose
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sampler, Skeletons
@@ -163,7 +163,7 @@ def test_training_learns_and_is_stored(skeletons: Skeletons, tmp_path: Path, sha
     assert after["sides_rmse_mm"] < 0.8 * before["sides_rmse_mm"]
     assert after["sides_pck150"] > before["sides_pck150"]
     assert json.loads((tmp_path / "b" / "scores.json").read_text()) == after
-    stored, facts = read_pose(pose_path(shape, tmp_path / "b"))
+    stored, facts = POSE_WEIGHTS.read(POSE_WEIGHTS.path(shape, tmp_path / "b"))
     assert facts["scores"] == after
     view = replace(AROUND, perspective=shape.perspective)
     sample = Sampler(held).draw(256, view, torch.Generator().manual_seed(9))
@@ -190,5 +190,5 @@ def test_same_seed_same_network(skeletons: Skeletons, tmp_path: Path) -> None:
     nets = [train_pose(skeletons, skeletons, tmp_path / name, shape=shape, steps=20, batch=16)[0] for name in "ab"]
     for one, other in zip(nets[0].state_dict().values(), nets[1].state_dict().values(), strict=True):
         assert torch.equal(one, other)
-    files = [pose_path(shape, tmp_path / name).read_bytes() for name in "ab"]
+    files = [POSE_WEIGHTS.path(shape, tmp_path / name).read_bytes() for name in "ab"]
     assert files[0] == files[1]
