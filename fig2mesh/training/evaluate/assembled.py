@@ -17,7 +17,7 @@ from fig2mesh.skeleton import BODY_PARTS, JOINT, JOINT_NAMES, anchor_joints
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.skeletons import AVERTED
 from fig2mesh.training.bodies.subject import Subject, draw_subject
-from fig2mesh.training.samples.sample import scene
+from fig2mesh.training.drawing.scene import scene
 from fig2mesh.training.samples.sdf import signed_distance
 
 PICTURE = 512

@@ -8,17 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, fill_inputs, sample
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, sample
 from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT
+from fig2mesh.training.samples.texels import Texels, gather
 from fig2mesh.training.samples.texture_data import load_drawings
 from fig2mesh.training.samples.unfold import Unfolded, unfold
 
@@ -33,19 +34,6 @@ COARSE: Final = 8
 
 SMOOTH: Final = 0.02
 OUTSIDE: Final = 0.1
-
-
-class Texels(NamedTuple):
-    """A batch: inputs (N, 8, S, S), place (N, 2, S, S), truth (N, 3, S, S) 0-1, weight (N, S, S), seen (N, S, S),
-    front (N, 3, H, W) 0-1, inside (N, 1, H, W)."""
-
-    inputs: Tensor
-    place: Tensor
-    truth: Tensor
-    weight: Tensor
-    seen: Tensor
-    front: Tensor
-    inside: Tensor
 
 
 def train_fill(
@@ -109,18 +97,6 @@ def train_fill(
     }
     FILL_WEIGHTS.save(FILL_WEIGHTS.path(net.shape, out), net, facts)
     return found
-
-
-def gather(bodies: Unfolded, rows: np.ndarray) -> Texels:
-    """Some bodies as tensors."""
-    place = torch.from_numpy(bodies.place[rows].astype(np.float32)).movedim(3, 1)
-    front = torch.from_numpy(bodies.front[rows].astype(np.float32) / 255).movedim(3, 1)
-    there, seen, same = (torch.from_numpy(array[rows]) for array in (bodies.there, bodies.seen, bodies.same))
-    truth = torch.from_numpy(bodies.truth[rows].astype(np.float32) / 255).movedim(3, 1)
-    weight = torch.from_numpy(bodies.weight[rows].astype(np.float32))
-    inside = torch.from_numpy(bodies.inside[rows].astype(np.float32))[:, None]
-    inputs = fill_inputs(place, there, seen, same, sample(front, place))
-    return Texels(inputs, place, truth, weight, seen, front, inside)
 
 
 def losses(model: torch.nn.Module, texels: Texels) -> dict[str, Tensor]:

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
+from fig2mesh.training.drawing.crop import ALLOWED, Crop, cut, seen_joints
 from fig2mesh.training.drawing.doodles import MANNERS, doodle, stance
 from fig2mesh.training.drawing.draw import Layers
 from fig2mesh.training.drawing.thing_shapes import Thing
 from fig2mesh.training.drawing.worn import put_on
 from fig2mesh.training.samples.crop_data import Crops
 from fig2mesh.training.samples.crop_views import OTHER_SIDE, Viewer
-from fig2mesh.training.samples.crops import ALLOWED, Crop, cut, seen_joints
 
 
 def some(count: int, seed: int = 0) -> list[Crop]:
