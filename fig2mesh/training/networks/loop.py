@@ -27,6 +27,7 @@ from torch import Tensor, nn
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
 from fig2mesh.errors import InputError
+from fig2mesh.training.networks.schedule import Schedule
 
 CHECKPOINT = "checkpoint.pt"
 LOG = "log.csv"
@@ -88,57 +89,74 @@ def seeded(seed: int, make: Callable[[], M]) -> M:
         return make()
 
 
-def run_loop(
-    *,
-    model: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    step: Step,
-    folder: Path,
-    validate: Validate | None = None,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = 1,
-    warmup: int = 100,
-    ema: float = 0.999,
-    clip: float | None = None,
-    device: torch.device | str = "cpu",
-    amp: bool | None = None,
-    validations: int = 20,
-    arguments: Mapping[str, Argument] | None = None,
-    checkpoint_s: float = 60.0,
-    clock: Callable[[], float] = time.perf_counter,
-) -> Result:
-    """Train `model` until its time or its steps are used up, going on from the checkpoint in `folder` if there is one.
+@dataclass(frozen=True)
+class Task:
+    """A network and how it learns.
 
-    budget_min : minutes, those before an interruption included; steps : their number; whichever ends first
+    model, optimizer : on the device of the schedule
+    step : loss of one batch
+    validate : scores for the log; None for none
     batch : samples a step, for the log
-    warmup : steps over which the learning rate rises; then it falls as a cosine of the progress
-    ema : decay of the averaged weights, less at first; 0 for none
-    clip : largest norm of the gradients
-    device : where the model is; amp : compute in bfloat16 where that is safe (the default on CUDA)
-    validations : how often, over the whole run; the last comes at its end
     arguments : whatever else decides the result; a checkpoint with others is refused
     """
-    if budget_min is None and steps is None:
+
+    model: nn.Module
+    optimizer: torch.optim.Optimizer
+    step: Step
+    validate: Validate | None = None
+    batch: int = 1
+    arguments: Mapping[str, Argument] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Regime:
+    """What is the same for all runs of a network.
+
+    warmup : steps over which the learning rate rises; then it falls as a cosine of the progress
+    ema : decay of the averaged weights, less at first; 0 for none
+    clip : largest norm of the gradients; None for any
+    amp : compute in bfloat16 where that is safe; None to do so on CUDA alone
+    validations : their number over the whole run; the last comes at its end
+    checkpoint_s : seconds from one checkpoint to the next
+    """
+
+    warmup: int = 100
+    ema: float = 0.999
+    clip: float | None = None
+    amp: bool | None = None
+    validations: int = 20
+    checkpoint_s: float = 60.0
+
+
+def run_loop(
+    task: Task,
+    folder: Path,
+    schedule: Schedule,
+    regime: Regime = Regime(),
+    *,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Result:
+    """Train a network until its time or steps are used up, going on from the checkpoint in `folder` if there is one."""
+    if schedule.budget_min is None and schedule.steps is None:
         raise ValueError("neither budget_min nor steps given")
-    device = torch.device(device)
-    mixed = device.type == "cuda" if amp is None else amp
+    model, optimizer = task.model, task.optimizer
+    device = torch.device(schedule.device)
+    mixed = device.type == "cuda" if regime.amp is None else regime.amp
     rates = [float(group.setdefault("initial_lr", group["lr"])) for group in optimizer.param_groups]
     identity: dict[str, Argument] = {
-        "seed": seed,
-        "steps": steps,
-        "budget_min": budget_min,
-        "batch": batch,
-        "warmup": warmup,
-        "ema": ema,
-        "clip": clip,
+        "seed": schedule.seed,
+        "steps": schedule.steps,
+        "budget_min": schedule.budget_min,
+        "batch": task.batch,
+        "warmup": regime.warmup,
+        "ema": regime.ema,
+        "clip": regime.clip,
         "amp": mixed,
         "learning_rate": rates[0],
-        **(arguments or {}),
+        **task.arguments,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    state = _State(torch.Generator().manual_seed(seed), _copy(model))
+    state = _State(torch.Generator().manual_seed(schedule.seed), _copy(model))
     _resume(folder, identity, model, optimizer, state)
 
     before, start = state.seconds, clock()
@@ -147,18 +165,19 @@ def run_loop(
     with torch.random.fork_rng(devices=devices):
         while state.progress < 1:
             torch.manual_seed(int(torch.randint(2**62, (), generator=state.generator)))
-            rate = _rate(state.step, state.progress, warmup)
+            rate = _rate(state.step, state.progress, regime.warmup)
             for group, initial in zip(optimizer.param_groups, rates, strict=True):
                 group["lr"] = initial * rate
             model.train()
             with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
-                losses = step(model, state.generator, state.progress)
+                losses = task.step(model, state.generator, state.progress)
             optimizer.zero_grad(set_to_none=True)
             losses["loss"].backward()  # type: ignore[no-untyped-call]
-            if clip is not None:
-                nn.utils.clip_grad_norm_(model.parameters(), clip)
+            if regime.clip is not None:
+                nn.utils.clip_grad_norm_(model.parameters(), regime.clip)
             optimizer.step()
-            _average(state.averaged, model, min(ema, (1 + state.step) / (10 + state.step)) if ema else 0.0)
+            decay = min(regime.ema, (1 + state.step) / (10 + state.step)) if regime.ema else 0.0
+            _average(state.averaged, model, decay)
             state.step += 1
             state.summed += 1
             for name, value in losses.items():
@@ -167,22 +186,23 @@ def run_loop(
 
             last = state.progress
             state.seconds = before + clock() - start
-            state.progress = _progress(state, budget_min, steps)
-            ticks = validations * ROWS_A_VALIDATION
+            state.progress = _progress(state, schedule.budget_min, schedule.steps)
+            ticks = regime.validations * ROWS_A_VALIDATION
             if int(state.progress * ticks) > int(last * ticks):
-                wanted = int(state.progress * validations) > int(last * validations)
-                _log_row(state, batch, rates[0] * rate, _scores(model, state, validate) if wanted else {})
+                wanted = int(state.progress * regime.validations) > int(last * regime.validations)
+                scores = _scores(model, state, task.validate) if wanted else {}
+                _log_row(state, task.batch, rates[0] * rate, scores)
                 write_log(folder / LOG, state.rows)
                 if state.progress >= 1 or state.seconds - drawn >= DRAW_S:
                     draw_curve(folder / CURVE, state.rows)
                     drawn = state.seconds
                 state.seconds = before + clock() - start
-            if state.seconds - saved >= checkpoint_s or state.progress >= 1:
+            if state.seconds - saved >= regime.checkpoint_s or state.progress >= 1:
                 _save(folder, identity, model, optimizer, state)
                 saved = state.seconds
     model.load_state_dict(state.averaged)
     model.eval()
-    return Result(state.step, state.step * batch, state.seconds, dict(state.rows[-1]) if state.rows else {})
+    return Result(state.step, state.step * task.batch, state.seconds, dict(state.rows[-1]) if state.rows else {})
 
 
 def _progress(state: _State, budget_min: float | None, steps: int | None) -> float:

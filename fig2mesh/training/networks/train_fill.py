@@ -16,7 +16,8 @@ from torch import Tensor
 from torch.nn import functional
 
 from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, sample
-from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT
 from fig2mesh.training.samples.texels import Texels, gather
@@ -39,22 +40,17 @@ OUTSIDE: Final = 0.1
 def train_fill(
     data: Path,
     out: Path,
-    *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
-    rate: float = RATE,
-    device: str = "cpu",
-    amp: bool = True,
+    schedule: Schedule,
 ) -> dict[str, float]:
     """Scores on the held-out splits; writes all that training leaves.
 
-    amp : compute in bfloat16, which processors that have it do three times as fast
+    Computes in bfloat16, which processors that have it do three times as fast.
     """
+    batch, rate = schedule.usual(BATCH, RATE)
+    device = schedule.device
     known = unfold(load_drawings(data, ("train",), pictures=True))
     held = {split: unfold(load_drawings(data, (split,), pictures=True, most=24)) for split in HELD_OUT}
-    net = seeded(seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
+    net = seeded(schedule.seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         rows = torch.randint(len(known), (batch,), generator=generator).numpy()
@@ -65,21 +61,17 @@ def train_fill(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=100,
-        clip=1.0,
-        device=device,
-        amp=amp,
-        validations=6,
-        arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
+        ),
+        out,
+        schedule,
+        Regime(warmup=100, clip=1.0, amp=True, validations=6),
     )
     found = {
         f"{split}_{name}": value
@@ -90,7 +82,7 @@ def train_fill(
     facts = {
         "data": recipe_digest(data),
         "bodies": len(known),
-        "seed": seed,
+        "seed": schedule.seed,
         "steps": result.steps,
         "samples": result.samples,
         "scores": found,

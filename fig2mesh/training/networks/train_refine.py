@@ -19,7 +19,8 @@ from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadHsv, HeadShape, disc_value,
 from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
 from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape, ViewRefine, refine, refine_inputs
 from fig2mesh.skeleton import PART
-from fig2mesh.training.networks.loop import Result, run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.painted import Painter, Sides, painters
 from fig2mesh.training.samples.part_data import HELD_OUT
@@ -36,19 +37,17 @@ def train_refine(
     data: Path,
     fill: Path,
     out: Path,
+    schedule: Schedule,
     *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
     filters: int = RefineShape.filters,
 ) -> Scores:
     """Scores on the held-out splits; writes all that training leaves.
 
     fill : folder with the weights of the network that paints the sides
     """
+    batch, _ = schedule.usual(BATCH, RATE)
     known, held = _painters(data, fill)
-    net = seeded(seed, lambda: ViewRefine(RefineShape(filters)))
+    net = seeded(schedule.seed, lambda: ViewRefine(RefineShape(filters)))
 
     def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         sides = _draw(known, batch, generator)
@@ -56,13 +55,14 @@ def train_refine(
         found = sides.painted + model(inputs)
         return {"loss": picture_loss(found, sides.truth, sides.known)}
 
-    result = _run(net, step, lambda: refine_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
+    result = _run(net, step, lambda: refine_scores(net, held["valid-clips"]), data, out, schedule, batch)
     found = {
         f"{split}_{name}": value
         for split, painter in held.items()
         for name, value in refine_scores(net, painter).items()
     }
-    REFINE_WEIGHTS.save(REFINE_WEIGHTS.path(net.shape, out), net, _facts(data, len(known), seed, result, found, out))
+    facts = _facts(data, len(known), schedule.seed, result, found, out)
+    REFINE_WEIGHTS.save(REFINE_WEIGHTS.path(net.shape, out), net, facts)
     return found
 
 
@@ -70,16 +70,14 @@ def train_head(
     data: Path,
     fill: Path,
     out: Path,
+    schedule: Schedule,
     *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = HEADS,
     shape: HeadShape = HeadShape(),  # noqa: B008 - frozen
 ) -> Scores:
     """Scores on the held-out splits; writes all that training leaves."""
+    batch, _ = schedule.usual(HEADS, RATE)
     known, held = _painters(data, fill)
-    net = seeded(seed, lambda: HeadHsv(shape))
+    net = seeded(schedule.seed, lambda: HeadHsv(shape))
 
     def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         crops = _heads(_draw(known, batch, generator))
@@ -91,11 +89,12 @@ def train_head(
         inputs = torch.cat([(painted + noise) * there[:, None], inputs[:, 3:]], dim=1)
         return head_losses(model(inputs), truth, there)
 
-    result = _run(net, step, lambda: head_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
+    result = _run(net, step, lambda: head_scores(net, held["valid-clips"]), data, out, schedule, batch)
     found = {
         f"{split}_{name}": value for split, painter in held.items() for name, value in head_scores(net, painter).items()
     }
-    HEAD_WEIGHTS.save(HEAD_WEIGHTS.path(net.shape, out), net, _facts(data, len(known), seed, result, found, out))
+    facts = _facts(data, len(known), schedule.seed, result, found, out)
+    HEAD_WEIGHTS.save(HEAD_WEIGHTS.path(net.shape, out), net, facts)
     return found
 
 
@@ -183,27 +182,23 @@ def _run(
     validate: Callable[[], Scores],
     data: Path,
     out: Path,
-    budget_min: float | None,
-    steps: int | None,
-    seed: int,
+    schedule: Schedule,
     batch: int,
 ) -> Result:
-    optimizer = torch.optim.AdamW(net.parameters(), RATE, weight_decay=1e-4)
+    _, rate = schedule.usual(batch, RATE)
+    optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     return run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=100,
-        clip=1.0,
-        amp=True,
-        validations=5,
-        arguments={"data": recipe_digest(data)},
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={"data": recipe_digest(data)},
+        ),
+        out,
+        schedule,
+        Regime(warmup=100, clip=1.0, amp=True, validations=5),
     )
 
 

@@ -12,6 +12,7 @@ import torch
 from fig2mesh.errors import FigureError
 from fig2mesh.nets.figure_parser import HEAT, LABELS, MASK, PARSER_WEIGHTS, SHIPPED, Parsed
 from fig2mesh.training.drawing.doodles import doodle, stance
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_parse import collate, heat_targets, losses, peaks, sides_right, train_parse
 from fig2mesh.training.samples.crop_data import FIELDS, RECIPE, load_crops
 from fig2mesh.training.samples.crop_views import View
@@ -86,7 +87,7 @@ def test_no_crops_is_said_in_one_line(tmp_path: Path) -> None:
 def test_a_short_run_writes_weights_and_scores(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # As many as there are doodles: none is scored twice.
     monkeypatch.setattr("fig2mesh.training.networks.train_parse.VIEWS", 6)
-    scores = train_parse(data, data / "run", steps=2, batch=2)
+    scores = train_parse(data, data / "run", Schedule(steps=2, batch=2))
     _, facts = PARSER_WEIGHTS.read(PARSER_WEIGHTS.path(SHIPPED, data / "run"))
     assert facts["steps"] == 2
     assert facts["crops"] == len(load_crops(data, "train"))
