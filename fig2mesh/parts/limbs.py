@@ -182,3 +182,9 @@ def complete(limb: Limb, twin: Limb, stout: float, pitch: float) -> Limb:
         ratio = np.interp(np.arange(len(ratio)), np.flatnonzero(known), ratio[known])
     smooth = np.convolve(np.pad(ratio * limb.usual, 2, mode="edge"), np.ones(5) / 5, mode="valid")
     return replace(limb, radius=np.maximum(smooth, pitch))
+
+
+def twins(limbs: list[Limb]) -> list[Limb]:
+    """The limb of the other side for each limb."""
+    by_name = {limb.name: limb for limb in limbs}
+    return [by_name[("r" if limb.name[0] == "l" else "l") + limb.name[1:]] for limb in limbs]

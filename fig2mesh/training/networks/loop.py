@@ -11,28 +11,21 @@ threads give the same weights, and an interrupted run that is resumed gives thos
 
 from __future__ import annotations
 
-import csv
-import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
-from fig2mesh.errors import InputError
+from fig2mesh.training.networks.checkpoint import Argument, State, resume, save_checkpoint
+from fig2mesh.training.networks.run_log import CURVE, LOG, draw_curve, write_log
 from fig2mesh.training.networks.schedule import Schedule
-
-CHECKPOINT = "checkpoint.pt"
-LOG = "log.csv"
-CURVE = "curve.png"
-SCORES = "scores.json"
 
 ROWS_A_VALIDATION = 10
 """Rows of the log from one validation to the next."""
@@ -43,7 +36,6 @@ DRAW_S = 60.0
 LAST_RATE = 0.01
 """Share of the learning rate that the cosine ends at."""
 
-Argument = str | int | float | bool | None
 Step = Callable[[nn.Module, torch.Generator, float], Mapping[str, Tensor]]
 """(model, generator, progress in [0, 1]) → scalar tensors; "loss" is what is minimised, the others are logged."""
 
@@ -66,20 +58,6 @@ class Result:
     samples: int
     seconds: float
     metrics: dict[str, float]
-
-
-@dataclass
-class _State:
-    """What changes from step to step, besides the model and the optimizer."""
-
-    generator: torch.Generator
-    averaged: dict[str, Tensor]
-    step: int = 0
-    seconds: float = 0.0
-    progress: float = 0.0
-    rows: list[dict[str, float]] = field(default_factory=list)
-    sums: dict[str, Tensor] = field(default_factory=dict)
-    summed: int = 0
 
 
 def seeded(seed: int, make: Callable[[], M]) -> M:
@@ -156,8 +134,8 @@ def run_loop(
         **task.arguments,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    state = _State(torch.Generator().manual_seed(schedule.seed), _copy(model))
-    _resume(folder, identity, model, optimizer, state)
+    state = State(torch.Generator().manual_seed(schedule.seed), _copy(model))
+    resume(folder, identity, model, optimizer, state)
 
     before, start = state.seconds, clock()
     saved = drawn = before
@@ -198,14 +176,14 @@ def run_loop(
                     drawn = state.seconds
                 state.seconds = before + clock() - start
             if state.seconds - saved >= regime.checkpoint_s or state.progress >= 1:
-                _save(folder, identity, model, optimizer, state)
+                save_checkpoint(folder, identity, model, optimizer, state)
                 saved = state.seconds
     model.load_state_dict(state.averaged)
     model.eval()
     return Result(state.step, state.step * task.batch, state.seconds, dict(state.rows[-1]) if state.rows else {})
 
 
-def _progress(state: _State, budget_min: float | None, steps: int | None) -> float:
+def _progress(state: State, budget_min: float | None, steps: int | None) -> float:
     shares = [0.0]
     if budget_min is not None:
         shares.append(state.seconds / max(60 * budget_min, 1e-9))
@@ -250,120 +228,15 @@ def averaged_weights(model: nn.Module, averaged: Mapping[str, Tensor]) -> Iterat
         model.load_state_dict(own)
 
 
-def _scores(model: nn.Module, state: _State, validate: Validate | None) -> dict[str, float]:
+def _scores(model: nn.Module, state: State, validate: Validate | None) -> dict[str, float]:
     if validate is None:
         return {}
     with averaged_weights(model, state.averaged):
         return {f"valid_{name}": float(value) for name, value in validate().items()}
 
 
-def _log_row(state: _State, batch: int, rate: float, scores: Mapping[str, float]) -> None:
+def _log_row(state: State, batch: int, rate: float, scores: Mapping[str, float]) -> None:
     means = {name: float(value) / state.summed for name, value in state.sums.items()}
     head = {"step": float(state.step), "seconds": state.seconds, "samples": float(state.step * batch), "rate": rate}
     state.rows.append({**head, **means, **scores})
     state.sums, state.summed = {}, 0
-
-
-def write_log(path: Path, rows: list[dict[str, float]]) -> None:
-    """Write the rows as CSV, one column a name; replaced as a whole, so that no row of a lost step remains."""
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    part = path.with_name(path.name + ".part")
-    with part.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([f"{row[name]:.6g}" if name in row else "" for name in columns] for row in rows)
-    os.replace(part, path)
-
-
-def write_scores(folder: Path, scores: Mapping[str, float]) -> None:
-    """Write the scores of a finished run, whole or not at all."""
-    part = folder / (SCORES + ".part")
-    part.write_text(json.dumps(dict(scores), indent=1) + "\n", encoding="utf-8")
-    os.replace(part, folder / SCORES)
-
-
-def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
-    """Losses and scores over the steps; nothing is drawn where matplotlib is not installed."""
-    try:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        from matplotlib.figure import Figure
-    except ImportError:
-        return
-    every = dict.fromkeys(name for row in rows for name in row)
-    names = [name for name in every if name not in ("step", "seconds", "samples", "rate")]
-    pairs = {
-        name.removeprefix("valid_"): [n for n in names if n.removeprefix("valid_") == name.removeprefix("valid_")]
-        for name in names
-    }
-    figure = Figure(figsize=(5, 2.2 * len(pairs)), layout="constrained")
-    for index, (title, shown) in enumerate(pairs.items()):
-        axes = figure.add_subplot(len(pairs), 1, index + 1)
-        for name in shown:
-            points = [(row["step"], row[name]) for row in rows if name in row]
-            axes.plot(*zip(*points, strict=True), label=name, marker="." if name.startswith("valid_") else "")
-        if all(row[name] > 0 for name in shown for row in rows if name in row):
-            axes.set_yscale("log")
-        axes.set_title(title, fontsize="small")
-        axes.legend(fontsize="x-small")
-    figure.savefig(path, dpi=80)
-
-
-def _save(
-    folder: Path,
-    identity: dict[str, Argument],
-    model: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    state: _State,
-) -> None:
-    content: dict[str, Any] = {
-        "arguments": identity,
-        "model": model.state_dict(),
-        "averaged": state.averaged,
-        "optimizer": optimizer.state_dict(),
-        "generator": state.generator.get_state(),
-        "step": state.step,
-        "seconds": state.seconds,
-        "progress": state.progress,
-        "rows": state.rows,
-        "sums": state.sums,
-        "summed": state.summed,
-    }
-    part = folder / (CHECKPOINT + ".part")
-    torch.save(content, part)
-    os.replace(part, folder / CHECKPOINT)
-
-
-def _resume(
-    folder: Path,
-    identity: dict[str, Argument],
-    model: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    state: _State,
-) -> None:
-    """Put the model, the optimizer and the state where the checkpoint in `folder` left them, if there is one."""
-    path = folder / CHECKPOINT
-    if not path.exists():
-        return
-    another = "give the same arguments to go on, or another folder to start again"
-    device = next(model.parameters()).device
-    try:
-        found: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
-        stored: dict[str, Argument] = found["arguments"]
-    except Exception as error:
-        raise InputError(str(path), f"no readable checkpoint ({type(error).__name__})", "delete it") from None
-    differing = [name for name in {**stored, **identity} if stored.get(name) != identity.get(name)]
-    if differing:
-        listed = ", ".join(f"{name} {stored.get(name)} there and {identity.get(name)} here" for name in differing)
-        raise InputError(str(folder), f"its checkpoint was made with other arguments: {listed}", another)
-    try:
-        model.load_state_dict(found["model"])
-    except RuntimeError:
-        raise InputError(str(folder), "its checkpoint is of another network", another) from None
-    optimizer.load_state_dict(found["optimizer"])
-    state.averaged = {name: value.to(device) for name, value in found["averaged"].items()}
-    state.generator.set_state(found["generator"])
-    state.sums = {name: value.to(device) for name, value in found["sums"].items()}
-    state.step, state.summed, state.rows = int(found["step"]), int(found["summed"]), found["rows"]
-    state.seconds, state.progress = float(found["seconds"]), float(found["progress"])

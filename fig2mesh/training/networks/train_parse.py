@@ -28,7 +28,8 @@ from fig2mesh.nets.figure_parser import (
     Parsed,
 )
 from fig2mesh.skeleton import JOINT
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.crop_data import KINDS, crops_digest, joined, load_crops
 from fig2mesh.training.samples.crop_views import Viewer

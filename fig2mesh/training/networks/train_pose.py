@@ -21,7 +21,8 @@ from torch import Tensor
 from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLift, PoseLiftShape, bone_lengths, lift
 from fig2mesh.skeleton import JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, View
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 
 if TYPE_CHECKING:

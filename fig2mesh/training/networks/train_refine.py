@@ -19,7 +19,8 @@ from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadHsv, HeadShape, disc_value,
 from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
 from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape, ViewRefine, refine, refine_inputs
 from fig2mesh.skeleton import PART
-from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.painted import Painter, Sides, painters

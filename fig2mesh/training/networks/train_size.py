@@ -20,7 +20,8 @@ from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.nets.part_size import OUTPUTS, SIZE_WEIGHTS, PartSizeNet, SizeShape, bone_unit
 from fig2mesh.records import _Checked
 from fig2mesh.skeleton import MIRRORED, PART_KIND, anchor_joints
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import read_shard, recipe_digest, shards
 

@@ -17,7 +17,8 @@ from torch.nn import functional
 
 from fig2mesh.nets.uv_unet import UV_WEIGHTS, UvUnet, UvUnetShape, uv_inputs
 from fig2mesh.skeleton import PART
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT
