@@ -14,6 +14,7 @@ from fig2mesh.convert.job import configure_logging
 from fig2mesh.errors import FigureError, OutputError
 from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, on_whole_picture, write_annotation
 from fig2mesh.settings import settings_for
+from fig2mesh.skeleton import FIGURE_HEIGHT
 from fig2mesh.view.job import scene_of
 from fig2mesh.view.page import view_page
 from fig2mesh.view.server import show
@@ -74,7 +75,7 @@ def preview_page(subject: Subject, annotation: Annotation, parts: str) -> str:
     if not annotation.mask.any():
         raise FigureError(subject.picture, "the silhouette is empty", "paint it first")
     settings: Any = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
-    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, 1.79))
+    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, FIGURE_HEIGHT))
 
 
 def main_job(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:

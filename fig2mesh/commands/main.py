@@ -23,6 +23,7 @@ from fig2mesh.commands import render as render_cli
 from fig2mesh.commands import tileset as tileset_cli
 from fig2mesh.commands import train as training_cli
 from fig2mesh.commands import view as view_cli
+from fig2mesh.commands.doctor import doctor
 from fig2mesh.commands.options import FILE, figure_files, messages, place_options
 from fig2mesh.commands.tradeoff import tradeoff
 from fig2mesh.settings import EFFECTS
@@ -220,19 +221,6 @@ def validate(files: tuple[Path, ...], as_json: bool) -> None:
         raise SystemExit(2)
 
 
-@cli.command()
-def doctor() -> None:
-    """Say whether everything that fig2mesh needs is there and works."""
-    from fig2mesh.libraries import examine
-
-    healthy = True
-    for name, fine, text in examine():
-        healthy &= fine
-        click.echo(f"{'ok  ' if fine else 'FAIL'} {name}: {text}")
-    if not healthy:
-        raise SystemExit(1)
-
-
 parse_cli.add_to(cli)
 render_cli.add_to(cli)
 view_cli.add_to(cli)
@@ -243,6 +231,7 @@ globe_cli.add_to(cli)
 data_cli.add_to(cli)
 training_cli.add_to(cli)
 cli.add_command(tradeoff)
+cli.add_command(doctor)
 
 
 def main(arguments: list[str] | None = None) -> int:

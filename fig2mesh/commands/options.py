@@ -1,4 +1,4 @@
-"""Options that every command has which starts from a drawing; click alone is imported."""
+"""Options that every command has which starts from a drawing; of what takes time to load, click alone is imported."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import Any, TypeVar
 
 import click
 
+from fig2mesh.skeleton import FIGURE_HEIGHT
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 FILE = click.Path(path_type=Path)
-
-HEIGHT_M = 1.79
-"""Height of a figure where nothing is said of it, metres."""
 
 TRANSFORMS = ("auto", "helmert", "affine", "poly1", "poly2", "poly3", "tps", "projective")
 """Those of `georef.mapsheet`, whose import takes longer than --help may."""
@@ -82,7 +81,7 @@ def place_options(command: F) -> F:
             show_default=True,
             help="Compass bearing of the nose; viewer: towards the reader of the map, south without --map.",
         ),
-        click.option("--height-m", type=float, metavar="M", help=f"Height of the figure.  [default: {HEIGHT_M}]"),
+        click.option("--height-m", type=float, metavar="M", help=f"Height of the figure.  [default: {FIGURE_HEIGHT}]"),
         click.option(
             "--altitude",
             type=float,

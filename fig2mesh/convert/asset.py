@@ -89,7 +89,7 @@ def asset_of(
 def _part_names(levels: Any) -> dict[int, str]:
     import numpy as np
 
-    from fig2mesh.records import PART_NAMES
+    from fig2mesh.skeleton import PART_NAMES
 
     labels = np.unique(np.concatenate([level.parts for level in levels]))
     return {int(label): PART_NAMES[label] for label in labels}

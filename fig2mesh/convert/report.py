@@ -15,8 +15,8 @@ from fig2mesh.asset_frame import asset_from_figure, on_drawing
 from fig2mesh.image_frame import image_frame
 from fig2mesh.libraries import PACKAGES, version
 from fig2mesh.measure.model import front_similarity, shape_measures, silhouette_iou
-from fig2mesh.records import PART_NAMES
 from fig2mesh.settings import Settings
+from fig2mesh.skeleton import PART_NAMES
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.evaluate.figures import Drawing, drawing_in
 from fig2mesh.field.body import Body
-from fig2mesh.measure.figures import Drawing, drawing_in
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
+from fig2mesh.skeleton import FIGURE_HEIGHT
 
 Say = Callable[[str], None]
 
@@ -86,7 +87,7 @@ def _body(files: Drawing) -> Body:
     from fig2mesh.convert.pipeline import make_only, steps
 
     results: dict[str, Any] = {"figure": read_figure(**files.arguments())}
-    make_only("body", steps(PRESETS["standard"], 1.79), results)
+    make_only("body", steps(PRESETS["standard"], FIGURE_HEIGHT), results)
     body = results["body"]
     assert isinstance(body, Body)
     return body

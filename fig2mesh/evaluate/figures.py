@@ -25,7 +25,7 @@ from fig2mesh.mesh.simplify import deviation, simplify
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import clean
 from fig2mesh.settings import Settings
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.skeleton import FIGURE_HEIGHT
 
 LEVELS = 3
 COARSE = 5000
