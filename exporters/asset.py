@@ -73,7 +73,7 @@ class TexturedMesh:
     texture : colours; None: untextured
     observed : one-channel texture, 255 where the drawing itself showed the surface, 0 where it is inferred
     colors : (V, 3) uint8 sRGB vertex colours (for formats without textures)
-    parts : (V,) uint8 part label per vertex (`fig2mesh.records.PART_NAMES`), 0 none
+    parts : (V,) uint8 part label per vertex (`fig2mesh.skeleton.PART_NAMES`), 0 none
     solid_index : (V,) int32, the vertex of the unsplit solid that each vertex came from: faces mapped through it
         form a closed, oriented, manifold surface
     deviation_m : measured mean and maximum distance to the surface before simplification, metres

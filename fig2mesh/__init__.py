@@ -14,7 +14,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from fig2mesh.libraries import __version__
 
 if TYPE_CHECKING:
     from exporters.validate import validate
@@ -33,6 +33,7 @@ __all__ = [
     "InputError",
     "Request",
     "Settings",
+    "__version__",
     "convert",
     "find_figures",
     "read_figure",

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.image_frame import ImageFrame, image_frame
-from fig2mesh.records import JOINT, Figure, FloatArray, Pose3D
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.records import Figure, FloatArray, Pose3D
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT
 from georef.frames import ASSET, FIGURE
 from georef.transform import Transform
 

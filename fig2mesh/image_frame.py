@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, Figure
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT
 
 WIDEST = 3.0
 """Drawings wider than this many heights are scaled by their width instead: nobody is 30 m long for lying down."""

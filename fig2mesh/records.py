@@ -13,38 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import frozen_array
+from fig2mesh.skeleton import LIMBS
 
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 ByteArray = NDArray[np.uint8]
 BoolArray = NDArray[np.bool_]
-
-# fmt: off
-JOINT_NAMES: tuple[str, ...] = (
-    "head", "eyes", "neck", "thorax", "pelvis",
-    "l_shoulder", "r_shoulder", "l_elbow", "r_elbow", "l_wrist", "r_wrist", "l_hand", "r_hand",
-    "l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle", "l_foot", "r_foot",
-)
-# fmt: on
-"""The 21 joints of paper §3; left and right are the figure's own."""
-
-JOINT: dict[str, int] = {name: index for index, name in enumerate(JOINT_NAMES)}
-
-# fmt: off
-PART_NAMES: tuple[str, ...] = (
-    "none", "torso", "head",
-    "l_upper_arm", "r_upper_arm", "l_lower_arm", "r_lower_arm", "l_hand", "r_hand",
-    "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg", "l_foot", "r_foot",
-    "hair", "garment", "prop",
-)
-# fmt: on
-"""Part labels: 0 nothing, 1-14 the body parts of paper §3, 15 and above extras."""
-
-PART: dict[str, int] = {name: index for index, name in enumerate(PART_NAMES)}
-BODY_PARTS: range = range(1, 15)
-
-
-LIMBS = ("l_arm", "r_arm", "l_leg", "r_leg")
 
 DepthOrder = Literal["front", "behind"]
 """Before the rest of the body as the viewer sees it, or behind it."""

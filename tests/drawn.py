@@ -20,7 +20,8 @@ from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import JOINT, JOINT_NAMES, Figure, Mesh, Pose3D
+from fig2mesh.records import Figure, Mesh, Pose3D
+from fig2mesh.skeleton import JOINT, JOINT_NAMES
 
 # fmt: off
 JOINTS = {

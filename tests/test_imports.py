@@ -73,3 +73,37 @@ def test_imports_go_one_way(package):
 def test_the_scan_sees_every_way_of_importing(source):
     assert offences(source, "georef")
     assert not offences("import numpy\nfrom georef.frames import ENU\nfrom . import errors", "georef")
+
+
+KNOWN_CYCLES = {("parse", "convert"), ("batch", "commands")}
+"""Imports between folders of fig2mesh that are not counted: logging of jobs, and the options that rows may set."""
+
+
+def folder_imports() -> dict[str, set[str]]:
+    """Folder of fig2mesh → the others that its modules import, inside functions too."""
+    graph: dict[str, set[str]] = {}
+    for path in sorted((ROOT / "fig2mesh").rglob("*.py")):
+        folder = path.relative_to(ROOT / "fig2mesh").parts[0].removesuffix(".py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fig2mesh."):
+                other = node.module.split(".")[1]
+                if other != folder and (folder, other) not in KNOWN_CYCLES:
+                    graph.setdefault(folder, set()).add(other)
+    return graph
+
+
+def test_folders_import_each_other_one_way_only():
+    left = folder_imports()
+    assert {"nets", "parts", "convert"} <= set(left)
+    while left:
+        free = [folder for folder, others in left.items() if not others & set(left)]
+        assert free, f"these import each other: {', '.join(sorted(left))}"
+        for folder in free:
+            del left[folder]
+
+
+def test_stages_do_not_import_what_stands_above_them():
+    above = {"commands", "convert", "measure", "evaluate", "training", "batch", "render", "view"}
+    graph = folder_imports()
+    for folder in ("parse", "parts", "nets", "pose", "texture", "mesh", "field"):
+        assert not graph[folder] & above, folder

@@ -11,27 +11,18 @@ from typing import Any
 import numpy as np
 
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.parse.annotation import COLOURS, Annotation
-from fig2mesh.parse.joint_writers import SKELETON
+from fig2mesh.parse.annotation import Annotation
 from fig2mesh.parse.keypoints import Joints
 from fig2mesh.parse.picture import on_white, read_labels, read_mask, read_view
 from fig2mesh.parse.read import joints_of_view
-from fig2mesh.records import JOINT_NAMES, LIMBS, PART_NAMES, BoolArray, ByteArray, FloatArray
+from fig2mesh.records import BoolArray, ByteArray, FloatArray
+from fig2mesh.skeleton import BONES, JOINT_NAMES, LABEL_COLOURS, LIMBS, PART_NAMES, STANDING, without_side
 
 INSIDE = 128
 """This bit of a pixel's byte says that it is in the silhouette; the lower ones are its part label."""
 
 MOST_PIXELS = 40_000_000
 """Browsers do not draw on larger canvases."""
-
-# fmt: off
-STANDING = {
-    "head": (0.0, 0.07), "eyes": (0.0, 0.065), "neck": (0.0, 0.15), "thorax": (0.0, 0.21), "pelvis": (0.0, 0.5),
-    "shoulder": (0.11, 0.19), "elbow": (0.16, 0.34), "wrist": (0.18, 0.48), "hand": (0.185, 0.52),
-    "hip": (0.06, 0.52), "knee": (0.065, 0.73), "ankle": (0.07, 0.95), "foot": (0.085, 0.985),
-}
-# fmt: on
-"""A standing person seen from the front: (right as seen of the middle for its left side, down), in heights."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +81,7 @@ def standing(mask: BoolArray) -> FloatArray:
     top, height, middle = rows.min(), np.ptp(rows) + 1, (columns.min() + columns.max() + 1) / 2
     joints = []
     for name in JOINT_NAMES:
-        x, y = STANDING[name.split("_")[-1]]
+        x, y = STANDING[without_side(name)]
         # The figure looks at the viewer: its left is on the right.
         joints.append((middle + (-x if name.startswith("r_") else x) * height, top + y * height))
     limit = np.array([mask.shape[1], mask.shape[0]], np.float32)
@@ -108,8 +99,8 @@ def packed(subject: Subject, annotation: Annotation) -> bytes:
         "joints": {name: [*point, int(seen)] for name, point, seen in rows},
         "depth_order": dict(annotation.depth_order),
         "parts": PART_NAMES,
-        "colours": COLOURS,
-        "bones": SKELETON,
+        "colours": LABEL_COLOURS,
+        "bones": BONES,
         "limbs": LIMBS,
     }
     pixels = np.where(annotation.mask, annotation.part_labels | INSIDE, 0).astype(np.uint8)

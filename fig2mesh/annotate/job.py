@@ -10,10 +10,10 @@ from pathlib import Path
 from fig2mesh.annotate.editing import Subject, begin
 from fig2mesh.annotate.request import AnnotateRequest
 from fig2mesh.annotate.server import annotation_server
-from fig2mesh.conversion.request import HEIGHT_M
 from fig2mesh.errors import FigureError, OutputError
 from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS, Annotation, on_whole_picture, write_annotation
 from fig2mesh.settings import Parts, settings_for
+from fig2mesh.skeleton import FIGURE_HEIGHT
 from fig2mesh.view.job import scene_of
 from fig2mesh.view.page import view_page
 from fig2mesh.view.server import show
@@ -61,7 +61,7 @@ def preview_page(subject: Subject, annotation: Annotation, parts: Parts) -> str:
     if not annotation.mask.any():
         raise FigureError(subject.picture, "the silhouette is empty", "paint it first")
     settings = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
-    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, HEIGHT_M))
+    return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, FIGURE_HEIGHT))
 
 
 def main_job(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:

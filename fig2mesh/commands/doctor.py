@@ -1,18 +1,74 @@
-"""`fig2mesh doctor`: whether everything that fig2mesh needs is there and works."""
+"""`fig2mesh doctor`: check that everything that the pipeline needs is there and works."""
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Iterator
+
 import click
+
+from fig2mesh.libraries import PACKAGES, SYSTEM_LIBRARIES, version
 
 
 @click.command()
 def doctor() -> None:
     """Say whether everything that fig2mesh needs is there and works."""
-    from fig2mesh.libraries import examine
-
     healthy = True
     for name, fine, text in examine():
         healthy &= fine
         click.echo(f"{'ok  ' if fine else 'FAIL'} {name}: {text}")
     if not healthy:
         raise SystemExit(1)
+
+
+def examine() -> Iterator[tuple[str, bool, str]]:
+    """Yield (name, whether it works, version or reason) for every library."""
+    for module, distribution in PACKAGES.items():
+        try:
+            importlib.import_module(module)
+        except Exception as error:
+            reason = " ".join(str(error).split())
+            remedy = f"; run: {SYSTEM_LIBRARIES}" if "lib" in reason and ".so" in reason else ""
+            yield distribution, False, f"{reason[:200]}{remedy}"
+            continue
+        yield distribution, True, version(distribution)
+    yield _filters()
+    yield _weights()
+    yield _gpu()
+
+
+def _filters() -> tuple[str, bool, str]:
+    """Without libOpenGL importing pymeshlab succeeds and the filters are silently missing."""
+    try:
+        import pymeshlab
+
+        usable = hasattr(pymeshlab.MeshSet(), "meshing_close_holes")
+    except ImportError:
+        usable = False
+    return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
+
+
+def _weights() -> tuple[str, bool, str]:
+    try:
+        from fig2mesh.nets import disn, figure_parser, part_size, pose_lift, weights
+        from fig2mesh.skeleton import KINDS
+
+        figure_parser.PARSER_WEIGHTS.shipped(figure_parser.SHIPPED)
+        pose_lift.POSE_WEIGHTS.shipped(pose_lift.SHIPPED)
+        for kind in KINDS:
+            part_size.SIZE_WEIGHTS.shipped(part_size.SizeShape(kind))
+            disn.PART_WEIGHTS.shipped(disn.DisnShape(kind))
+    except Exception as error:
+        return "weights", False, " ".join(str(error).split())[:200]
+    megabytes = sum(path.stat().st_size for path in weights.FOLDER.glob("*.safetensors")) / 1e6
+    return "weights", True, f"{megabytes:.0f} MB"
+
+
+def _gpu() -> tuple[str, bool, str]:
+    try:
+        import torch
+
+        found = torch.cuda.get_device_name(0) if torch.cuda.is_available() else "none (not needed)"
+    except Exception as error:
+        return "GPU", False, " ".join(str(error).split())[:200]
+    return "GPU", True, found

@@ -64,7 +64,7 @@ def figures(folder: Path, quality: str, parts: str, out: Path | None, json_: boo
     DIR holds folders with image.png, keypoints.json and, where needed, mask.png, or pairs of NAME.png and NAME.json.
     A figure of which no model can be made has the reason in the table, and the exit code is 1.
     """
-    from fig2mesh.measure.figures import as_json, as_markdown, evaluate_figures, find_drawings
+    from fig2mesh.evaluate.figures import as_json, as_markdown, evaluate_figures, find_drawings
     from fig2mesh.settings import settings_for
 
     settings = settings_for(quality, parts=parts)  # type: ignore[arg-type]
@@ -112,7 +112,7 @@ def parse(
 
         text += evaluate_crops(source, count, blazepose, lambda line: click.echo(line, err=True))
     if figures is not None:
-        from fig2mesh.measure.parser import evaluate_parse
+        from fig2mesh.training.evaluate.parser import evaluate_parse
 
         text += evaluate_parse(figures, lambda line: click.echo(line, err=True))
     _write(text, out)

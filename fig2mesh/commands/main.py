@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import click
 
-from fig2mesh import __version__
 from fig2mesh.commands.annotate import annotate
 from fig2mesh.commands.batch import batch
 from fig2mesh.commands.data import data
@@ -36,6 +35,7 @@ from fig2mesh.conversion.request import (
     OutputOptions,
     PlaceRequest,
 )
+from fig2mesh.libraries import __version__
 
 GROUPS = {
     "Figure": FigureFiles,

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fig2mesh.errors import InputError
+from fig2mesh.skeleton import KINDS
+from fig2mesh.training.networks.schedule import Schedule
 
 if TYPE_CHECKING:
     from fig2mesh.training.bodies.pack import Pack
 
-KINDS = ("torso", "head", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
-"""`fig2mesh.skeleton.KINDS`, again, because that imports NumPy."""
 
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
 """Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
@@ -95,14 +95,16 @@ def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device
         known,
         held,
         out,
+        Schedule(
+            budget_min=_minutes("pose", budget, epochs),
+            steps=None if epochs is None else epochs * 100_000 // given["batch"],
+            seed=given["seed"],
+            batch=given["batch"],
+            device=_device(device),
+        ),
         shape=shape,
         augment=not given["plain"],
-        budget_min=_minutes("pose", budget, epochs),
-        steps=None if epochs is None else epochs * 100_000 // given["batch"],
-        seed=given["seed"],
         dropout=given["dropout"],
-        batch=given["batch"],
-        device=_device(device),
     )
     _say({name: value for name, value in scores.items() if "_mean_" not in name})
 
@@ -123,10 +125,7 @@ def size(
             data,
             kind,
             out / f"size-{kind}",
-            budget_min=_minutes("size", budget, epochs),
-            steps=None if epochs is None else 1000 * epochs,
-            seed=seed,
-            device=_device(device),
+            _schedule("size", budget, epochs, seed, device=_device(device)),
         )
         _say(scores)
 
@@ -161,12 +160,14 @@ def parts(
             kind,
             DisnShape.of(kind, variant),
             out / f"disn-{kind}-{variant}",
-            budget_min=_minutes("parts", budget, epochs),
+            Schedule(
+                budget_min=_minutes("parts", budget, epochs),
+                seed=seed,
+                rate=lr,
+                device=_device(device),
+                init=None if init is None else init / f"disn-{kind}-{variant}",
+            ),
             epochs=epochs,
-            seed=seed,
-            device=_device(device),
-            lr=lr,
-            init=None if init is None else init / f"disn-{kind}-{variant}",
         )
         _say(scores)
 
@@ -192,19 +193,8 @@ def uv(
     from fig2mesh.nets.uv_unet import UvUnetShape
     from fig2mesh.training.networks.train_uv import train_uv
 
-    _say(
-        train_uv(
-            data,
-            out,
-            shape=UvUnetShape(masks),
-            budget_min=_minutes("uv", budget, epochs),
-            steps=None if epochs is None else 1000 * epochs,
-            seed=seed,
-            device=_device(device),
-            rate=lr,
-            init=init,
-        )
-    )
+    schedule = _schedule("uv", budget, epochs, seed, rate=lr, device=_device(device), init=init)
+    _say(train_uv(data, out, schedule, UvUnetShape(masks)))
 
 
 @train.command()
@@ -214,16 +204,7 @@ def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device
     """Where unseen texels take their colours."""
     from fig2mesh.training.networks.train_fill import train_fill
 
-    _say(
-        train_fill(
-            data,
-            out,
-            budget_min=_minutes("fill", budget, epochs),
-            steps=None if epochs is None else 1000 * epochs,
-            seed=seed,
-            device=_device(device),
-        )
-    )
+    _say(train_fill(data, out, _schedule("fill", budget, epochs, seed, device=_device(device))))
 
 
 def filled(command: Callable[..., None]) -> Callable[..., None]:
@@ -240,8 +221,7 @@ def refine(data: Path, out: Path, budget: float | None, epochs: int | None, devi
     from fig2mesh.training.networks.train_refine import train_refine
 
     _check_cpu(device)
-    steps = None if epochs is None else 1000 * epochs
-    _say(train_refine(data, fill, out, budget_min=_minutes("refine", budget, epochs), steps=steps, seed=seed))
+    _say(train_refine(data, fill, out, _schedule("refine", budget, epochs, seed)))
 
 
 @train.command()
@@ -253,8 +233,7 @@ def head(data: Path, out: Path, budget: float | None, epochs: int | None, device
     from fig2mesh.training.networks.train_refine import train_head
 
     _check_cpu(device)
-    steps = None if epochs is None else 1000 * epochs
-    _say(train_head(data, fill, out, budget_min=_minutes("head", budget, epochs), steps=steps, seed=seed))
+    _say(train_head(data, fill, out, _schedule("head", budget, epochs, seed)))
 
 
 @train.command()
@@ -285,19 +264,14 @@ def parse(
     from fig2mesh.training.networks.train_parse import train_parse
 
     _check_cpu(device)
-    _say(
-        train_parse(
-            data,
-            out,
-            budget_min=_minutes("parse", budget, epochs),
-            steps=None if epochs is None else 1000 * epochs,
-            seed=seed,
-            rate=lr,
-            init=init,
-            blazepose=blazepose,
-            whole=whole,
-        )
-    )
+    schedule = _schedule("parse", budget, epochs, seed, rate=lr, init=init)
+    _say(train_parse(data, out, schedule, blazepose=blazepose, whole=whole))
+
+
+def _schedule(network: str, budget: float | None, epochs: int | None, seed: int, **given: Any) -> Schedule:
+    """The schedule of a network whose epochs are thousands of steps; given : further fields."""
+    steps = None if epochs is None else 1000 * epochs
+    return Schedule(_minutes(network, budget, epochs), steps, seed, **given)
 
 
 def _minutes(network: str, budget: float | None, epochs: int | None) -> float | None:

@@ -17,7 +17,7 @@ from fig2mesh.conversion.keys import figure_digest
 from fig2mesh.conversion.observer import Observer
 from fig2mesh.conversion.place import Placed, open_map, place
 from fig2mesh.conversion.plan import Plan, normals_of, plan
-from fig2mesh.conversion.request import HEIGHT_M, Request
+from fig2mesh.conversion.request import Request
 from fig2mesh.conversion.runner import Inputs, Results, Runner
 from fig2mesh.conversion.stores import FolderStore, NoStore, Store
 from fig2mesh.errors import InputError
@@ -25,6 +25,7 @@ from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import CleanFigure, clean
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings
+from fig2mesh.skeleton import FIGURE_HEIGHT
 from fig2mesh.stages.lift import lift
 from fig2mesh.stages.model import model
 from fig2mesh.stages.simplify import simplify
@@ -99,7 +100,7 @@ def run_stages(
     settings: Settings,
     goals: Sequence[Callable[..., object]],
     *,
-    height_m: float = HEIGHT_M,
+    height_m: float = FIGURE_HEIGHT,
     store: Store | None = None,
     observer: Observer | None = None,
 ) -> FigureRun:

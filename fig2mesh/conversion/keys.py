@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import exporters
-import fig2mesh
 import georef
 from fig2mesh.libraries import PACKAGES, version
 from fig2mesh.records import Figure
@@ -29,8 +28,9 @@ OTHER_LIBRARIES: Final = ("pillow", "pyvips", "pyproj")
 def fingerprint() -> str:
     """Digest of everything besides input and settings that results depend on: our code, the weights, libraries."""
     digest = hashlib.sha256()
-    for package in (georef, exporters, fig2mesh):
-        folder = Path(package.__path__[0])
+    # Not by importing fig2mesh, whose front door imports this module.
+    folders = (Path(georef.__path__[0]), Path(exporters.__path__[0]), Path(__file__).parents[1])
+    for folder in folders:
         for file in sorted(folder.rglob("*")):
             inner = file.relative_to(folder)
             if file.suffix in (".py", ".safetensors", ".tif") and inner.parts[0] not in NO_RESULTS and file.is_file():

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.conversion.request import HEIGHT_M, PlaceRequest
+from fig2mesh.conversion.request import PlaceRequest
 from fig2mesh.errors import InputError
+from fig2mesh.skeleton import FIGURE_HEIGHT
 from georef.bearing import parse_facing
 from georef.heights import ellipsoidal_height
 from georef.placement import GeoPlacement
@@ -82,7 +83,7 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
     path : the picture of the figure
     """
     if sheet is None:
-        return Placed(placement_of(request), HEIGHT_M if request.height_m is None else request.height_m)
+        return Placed(placement_of(request), FIGURE_HEIGHT if request.height_m is None else request.height_m)
     from fig2mesh.asset_frame import foot_on_picture, height_on_picture
 
     drawn_on_it = sheet.picture is not None and path.exists() and path.samefile(sheet.picture)
@@ -96,7 +97,7 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
         raise InputError("--map", found, "pass --at X Y, the pixel of the sheet where the feet are")
     spot = sheet.place(*pixel, source=source)
     notes += spot.notes
-    height = HEIGHT_M if request.height_m is None else request.height_m
+    height = FIGURE_HEIGHT if request.height_m is None else request.height_m
     if request.size_from == "map":
         height = height_on_picture(figure) * spot.up_m
         if not drawn_on_it:
@@ -126,7 +127,7 @@ def placement_of(
 ) -> GeoPlacement | None:
     """The placement at a place, by default --lonlat; None without one. dry: heights are not converted."""
     heading = parse_facing(request.facing, viewer_deg=viewer_deg)
-    height_m = height if height is not None else HEIGHT_M if request.height_m is None else request.height_m
+    height_m = height if height is not None else FIGURE_HEIGHT if request.height_m is None else request.height_m
     if not 0.001 <= height_m <= 1e6:
         option = "--height-m" if request.size_from == "height" else "--size-from map"
         raise InputError(option, f"{height_m:g} m", "give a height between 1 mm and 1000 km")

@@ -12,9 +12,7 @@ from typing import Any, Literal
 from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.errors import InputError
 from fig2mesh.settings import Closing, Contours, Mesher, Parts, Quality, Settings, Textures, settings_for
-
-HEIGHT_M = 1.79
-"""Height of a figure where nothing is said of it, metres."""
+from fig2mesh.skeleton import FIGURE_HEIGHT
 
 MAX_SEED = 2**31 - 1
 
@@ -93,7 +91,9 @@ class PlaceRequest:
         metavar="N|NE|…|DEG|viewer",
         help="Compass bearing of the nose; viewer: towards the reader of the map, south without --map.",
     )
-    height_m: float | None = option(default=None, metavar="M", default_text=f"{HEIGHT_M}", help="Height of the figure.")
+    height_m: float | None = option(
+        default=None, metavar="M", default_text=str(FIGURE_HEIGHT), help="Height of the figure."
+    )
     altitude: float = option(default=0.0, metavar="M", help="Height of the feet.")
     altitude_datum: str = option(
         default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", help="What --altitude is measured from."

@@ -11,6 +11,7 @@ from fig2mesh.conversion.observer import Observer
 from fig2mesh.conversion.stores import NoStore, Store
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings
+from fig2mesh.skeleton import FIGURE_HEIGHT
 from fig2mesh.stages.stage import Stage
 from fig2mesh.stages.table import STAGES
 
@@ -28,7 +29,7 @@ class Inputs:
 
     figure: Figure
     pieces: int
-    height_m: float = 1.79
+    height_m: float = FIGURE_HEIGHT
 
     def values(self) -> dict[str, object]:
         """By name."""

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import PART, PartSdf
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import PART
 
 Distance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Signed distance (N,) of points (N, 3), both float64 in FIGURE units, negative inside."""

@@ -1,1 +1,1 @@
-"""How good a model, a front view or the parser is: measures taken on results."""
+"""Measures of results: how good a model or its front view is."""

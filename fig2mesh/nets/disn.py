@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from fig2mesh.nets.weights import WeightsFile
 from fig2mesh.skeleton import ANCHORS
 
 MASK: Final = 64
@@ -275,3 +276,13 @@ def _hats(points: Tensor, size: int) -> Tensor:
     place = ((place + 1) * (size / 2) - 0.5).clamp(0, size - 1)
     hats = (1 - (place[..., None] - pixel).abs()).clamp_min_(0)
     return (hats[..., 1, :, None] * hats[..., 0, None, :]).flatten(-2)
+
+
+PART_WEIGHTS: Final = WeightsFile[DisnShape, Disn](
+    network="disn",
+    title="part network",
+    build=Disn,
+    read_shape=lambda facts: DisnShape.of(facts["kind"], facts["variant"]),
+    file_name=lambda shape: f"disn-{shape.kind}-{shape.variant}",
+    write_shape=lambda shape: {"kind": shape.kind, "variant": shape.variant},
+)

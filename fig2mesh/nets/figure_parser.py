@@ -8,18 +8,15 @@ Sources: Sandler et al. 2018, "MobileNetV2"; Bazarevsky et al. 2020, "BlazePose"
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Final, NamedTuple
+from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.nets import weights
-from fig2mesh.records import JOINT_NAMES, PART_NAMES
+from fig2mesh.nets.weights import WeightsFile
+from fig2mesh.skeleton import JOINT_NAMES, PART_NAMES
 
 INPUT: Final = 192
 """Pixels a side of the picture that goes in; other multiples of 32 work, at other sizes of figures than trained on."""
@@ -183,24 +180,10 @@ def _twice(values: Tensor) -> Tensor:
     return functional.interpolate(values, scale_factor=2, mode="bilinear", align_corners=False)
 
 
-def parser_path(folder: Path = weights.FOLDER) -> Path:
-    """Where the weights are."""
-    return folder / "figure-parser.safetensors"
-
-
-def save_parser(path: Path, net: FigureParser, facts: Mapping[str, Any]) -> None:
-    """Write a network; its shape is put among the facts."""
-    weights.save(path, net.state_dict(), {**facts, "network": "figure parser", "shape": asdict(net.shape)})
-
-
-def read_parser(path: Path) -> tuple[FigureParser, dict[str, Any]]:
-    """A network, ready for inference, and its facts."""
-    return weights.read_module(
-        path, lambda shape: FigureParser(FigureParserShape(tuple(shape["width"]))), "figure parser"
-    )
-
-
-@functools.cache
-def load() -> FigureParser:
-    """The shipped network, read once a process."""
-    return read_parser(parser_path())[0]
+PARSER_WEIGHTS: Final = WeightsFile[FigureParserShape, FigureParser](
+    network="figure parser",
+    title="figure parser",
+    build=FigureParser,
+    read_shape=lambda facts: FigureParserShape(tuple(facts["width"])),
+    file_name=lambda shape: "figure-parser",
+)

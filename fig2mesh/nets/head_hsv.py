@@ -7,18 +7,15 @@ disc, (s cos h, s sin h), so that red has no jump.
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.nets import weights
+from fig2mesh.nets.weights import WeightsFile
 
 SIZE: Final = 64
 """Pixels of an edge."""
@@ -175,22 +172,10 @@ def _centres(count: int) -> Tensor:
     return (torch.arange(count) + 0.5) / count * 2 - 1
 
 
-def head_path(folder: Path = weights.FOLDER) -> Path:
-    """Where the weights are."""
-    return folder / "head-hsv.safetensors"
-
-
-def save_head(path: Path, net: HeadHsv, facts: Mapping[str, Any]) -> None:
-    """Write a network; its shape is put among the facts."""
-    weights.save(path, net.state_dict(), {**facts, "network": "head-hsv", "shape": asdict(net.shape)})
-
-
-def read_head(path: Path) -> tuple[HeadHsv, dict[str, Any]]:
-    """A network, ready for inference, and its facts."""
-    return weights.read_module(path, lambda shape: HeadHsv(HeadShape(**shape)), "head network")
-
-
-@functools.cache
-def load() -> HeadHsv:
-    """The shipped network, read once a process."""
-    return read_head(head_path())[0]
+HEAD_WEIGHTS: Final = WeightsFile[HeadShape, HeadHsv](
+    network="head-hsv",
+    title="head network",
+    build=HeadHsv,
+    read_shape=lambda facts: HeadShape(**facts),
+    file_name=lambda shape: "head-hsv",
+)

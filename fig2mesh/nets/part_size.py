@@ -7,18 +7,15 @@ of the view; right parts go in mirrored, as left ones.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from fig2mesh.nets import weights
+from fig2mesh.nets.weights import WeightsFile
 from fig2mesh.skeleton import ANCHORS, KINDS, MIRRORED, PART_KIND, anchor_joints, part_centre
 
 NEURONS: Final = (20, 40, 20)
@@ -91,22 +88,10 @@ def part_size(
     return np.asarray(sizes[:3], np.float32), float(sizes[3])
 
 
-def size_path(kind: str, folder: Path = weights.FOLDER) -> Path:
-    """Where the weights of a kind's network are."""
-    return folder / f"size-{kind}.safetensors"
-
-
-def save_size(path: Path, net: PartSizeNet, facts: Mapping[str, Any]) -> None:
-    """Write a size network; its shape is put among the facts."""
-    weights.save(path, net.state_dict(), {**facts, "network": "size", "shape": asdict(net.shape)})
-
-
-def read_size(path: Path) -> tuple[PartSizeNet, dict[str, Any]]:
-    """A size network, ready for inference, and its facts."""
-    return weights.read_module(path, lambda shape: PartSizeNet(SizeShape(**shape)), "size network")
-
-
-@functools.cache
-def load(kind: str) -> PartSizeNet:
-    """The shipped network of a kind, read once a process."""
-    return read_size(size_path(kind))[0]
+SIZE_WEIGHTS: Final = WeightsFile[SizeShape, PartSizeNet](
+    network="size",
+    title="size network",
+    build=PartSizeNet,
+    read_shape=lambda facts: SizeShape(**facts),
+    file_name=lambda shape: f"size-{shape.kind}",
+)

@@ -8,18 +8,15 @@ the figure would be the same from behind as from the front, and that is where tr
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import Hourglass
+from fig2mesh.nets.weights import WeightsFile
 
 CHANNELS: Final = 8
 """place (2), there, seen, same (1 each), colour (3)."""
@@ -76,22 +73,10 @@ def sample(picture: Tensor, place: Tensor) -> Tensor:
     )
 
 
-def fill_path(folder: Path = weights.FOLDER) -> Path:
-    """Where the weights are."""
-    return folder / "texture-fill.safetensors"
-
-
-def save_fill(path: Path, net: TextureFill, facts: Mapping[str, Any]) -> None:
-    """Write a network; its shape is put among the facts."""
-    weights.save(path, net.state_dict(), {**facts, "network": "texture-fill", "shape": asdict(net.shape)})
-
-
-def read_fill(path: Path) -> tuple[TextureFill, dict[str, Any]]:
-    """A network, ready for inference, and its facts."""
-    return weights.read_module(path, lambda shape: TextureFill(FillShape(**shape)), "texture network")
-
-
-@functools.cache
-def load() -> TextureFill:
-    """The shipped network, read once a process."""
-    return read_fill(fill_path())[0]
+FILL_WEIGHTS: Final = WeightsFile[FillShape, TextureFill](
+    network="texture-fill",
+    title="texture network",
+    build=TextureFill,
+    read_shape=lambda facts: FillShape(**facts),
+    file_name=lambda shape: "texture-fill",
+)

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import torch
 from torch import Tensor
 
-from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import FILTERS, Hourglass
-from fig2mesh.records import BODY_PARTS
+from fig2mesh.nets.weights import WeightsFile
+from fig2mesh.skeleton import BODY_PARTS
 
 PARTS: Final = len(BODY_PARTS)
 
@@ -68,22 +65,10 @@ def infer_uv(net: UvUnet, depth: Tensor, labels: Tensor) -> Tensor:
     return found.clamp(0.0, 1.0)
 
 
-def uv_path(shape: UvUnetShape = SHIPPED, folder: Path = weights.FOLDER) -> Path:
-    """Where the weights are."""
-    return folder / f"uv-{'masks' if shape.masks else 'depth'}.safetensors"
-
-
-def save_uv(path: Path, net: UvUnet, facts: Mapping[str, Any]) -> None:
-    """Write a network; its shape is put among the facts."""
-    weights.save(path, net.state_dict(), {**facts, "network": "uv", "shape": asdict(net.shape)})
-
-
-def read_uv(path: Path) -> tuple[UvUnet, dict[str, Any]]:
-    """A network, ready for inference, and its facts."""
-    return weights.read_module(path, lambda shape: UvUnet(UvUnetShape(**shape)), "UV network")
-
-
-@functools.cache
-def load() -> UvUnet:
-    """The shipped network, read once a process."""
-    return read_uv(uv_path())[0]
+UV_WEIGHTS: Final = WeightsFile[UvUnetShape, UvUnet](
+    network="uv",
+    title="UV network",
+    build=UvUnet,
+    read_shape=lambda facts: UvUnetShape(**facts),
+    file_name=lambda shape: f"uv-{'masks' if shape.masks else 'depth'}",
+)

@@ -6,18 +6,15 @@ it changes nothing.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import torch
 from torch import Tensor
 
-from fig2mesh.nets import weights
 from fig2mesh.nets.hourglass import Hourglass
 from fig2mesh.nets.uv_unet import uv_inputs
+from fig2mesh.nets.weights import WeightsFile
 
 CHANNELS: Final = 7
 """Painted colours (3), texture coordinates (2), depth (1), whether there is anything (1)."""
@@ -56,22 +53,10 @@ def refine(net: ViewRefine, painted: Tensor, uv: Tensor, depth: Tensor, labels: 
     return changed.clamp(0, 1)
 
 
-def refine_path(folder: Path = weights.FOLDER) -> Path:
-    """Where the weights are."""
-    return folder / "view-refine.safetensors"
-
-
-def save_refine(path: Path, net: ViewRefine, facts: Mapping[str, Any]) -> None:
-    """Write a network; its shape is put among the facts."""
-    weights.save(path, net.state_dict(), {**facts, "network": "view-refine", "shape": asdict(net.shape)})
-
-
-def read_refine(path: Path) -> tuple[ViewRefine, dict[str, Any]]:
-    """A network, ready for inference, and its facts."""
-    return weights.read_module(path, lambda shape: ViewRefine(RefineShape(**shape)), "refining network")
-
-
-@functools.cache
-def load() -> ViewRefine:
-    """The shipped network, read once a process."""
-    return read_refine(refine_path())[0]
+REFINE_WEIGHTS: Final = WeightsFile[RefineShape, ViewRefine](
+    network="view-refine",
+    title="refining network",
+    build=ViewRefine,
+    read_shape=lambda facts: RefineShape(**facts),
+    file_name=lambda shape: "view-refine",
+)

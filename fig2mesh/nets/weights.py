@@ -10,16 +10,17 @@ import functools
 import json
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, Generic, TypeVar, cast
 
 import torch
 from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
-from fig2mesh.nets.disn import Disn, DisnShape
 from georef.untrusted.json_file import parse_json
 
+S = TypeVar("S")
 M = TypeVar("M", bound=nn.Module)
 
 FOLDER: Final = Path(__file__).resolve().parent.parent / "weights"
@@ -63,43 +64,55 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     return {name: value.float() if value.is_floating_point() else value for name, value in state.items()}, facts
 
 
-def read_module(path: Path, make: Callable[[dict[str, Any]], M], what: str) -> tuple[M, dict[str, Any]]:
-    """A network, ready for inference, and its facts.
+@dataclass(frozen=True)
+class WeightsFile(Generic[S, M]):
+    """Storage of the networks of one kind: a file for each shape, its shape among the facts.
 
-    make : network from the shape among the facts; what : it is called, "pose network"
+    network : name of the kind among the facts; title : its name in messages, "pose network"
+    build : an untrained network of a shape; it keeps the shape as its attribute `shape`
+    read_shape : shape from what the facts say of it
+    file_name : name of the file of a shape, without its suffix
+    write_shape : what the facts say of a shape
     """
-    state, facts = read(path)
-    try:
-        net = make(facts["shape"])
-        net.load_state_dict(state)
-    except (AttributeError, LookupError, TypeError, ValueError, RuntimeError, ArithmeticError) as error:
-        finding = f"not the weights of a {what} ({str(error).splitlines()[0]})"
-        raise InputError(path, finding, REINSTALL) from None
-    return net.eval().requires_grad_(False), facts
 
+    network: str
+    title: str
+    build: Callable[[S], M]
+    read_shape: Callable[[dict[str, Any]], S]
+    file_name: Callable[[S], str]
+    write_shape: Callable[[S], dict[str, Any]] = lambda shape: asdict(cast(Any, shape))
 
-def disn_path(shape: DisnShape, folder: Path = FOLDER) -> Path:
-    """Where the weights of a part network are."""
-    return folder / f"disn-{shape.kind}-{shape.variant}.safetensors"
+    def path(self, shape: S, folder: Path | None = None) -> Path:
+        """Path of the weights of a shape, in the package unless a folder is given."""
+        return (folder or FOLDER) / f"{self.file_name(shape)}.safetensors"
 
+    def save(self, path: Path, net: M, facts: Mapping[str, Any]) -> None:
+        """Write a network; its shape is put among the facts."""
+        shape = self.write_shape(cast(S, net.shape))
+        save(path, net.state_dict(), {**facts, "network": self.network, "shape": shape})
 
-def save_disn(path: Path, net: Disn, facts: Mapping[str, Any]) -> None:
-    """Write a part network; its shape is put among the facts."""
-    shape = {"kind": net.shape.kind, "variant": net.shape.variant}
-    save(path, net.state_dict(), {**facts, "network": "disn", "shape": shape})
+    def read(self, path: Path) -> tuple[M, dict[str, Any]]:
+        """A network, ready for inference, and its facts."""
+        state, facts = read(path)
+        try:
+            net = self.build(self.read_shape(facts["shape"]))
+            net.load_state_dict(state)
+        except (AttributeError, LookupError, TypeError, ValueError, RuntimeError, ArithmeticError) as error:
+            finding = f"not the weights of a {self.title} ({str(error).splitlines()[0]})"
+            raise InputError(path, finding, REINSTALL) from None
+        return net.eval().requires_grad_(False), facts
 
-
-def read_disn(path: Path) -> tuple[Disn, dict[str, Any]]:
-    """A part network, ready for inference, and its facts."""
-    return read_module(path, lambda shape: Disn(DisnShape.of(shape["kind"], shape["variant"])), "part network")
+    def shipped(self, shape: S) -> M:
+        """The shipped network of a shape, read once a process."""
+        net: M = read_shipped(self, shape)
+        return net
 
 
 @functools.cache
-def load(kind: str, variant: str = "two-stream-pose") -> Disn:
-    """The shipped network of a part, read once a process."""
-    shape = DisnShape.of(kind, variant)
-    path = disn_path(shape)
-    net, _ = read_disn(path)
+def read_shipped(stored: WeightsFile[Any, Any], shape: Any) -> Any:
+    """Read a shipped network for `WeightsFile.shipped`; failures are not remembered."""
+    path = stored.path(shape)
+    net, _ = stored.read(path)
     if net.shape != shape:
-        raise InputError(path, f"weights of a {net.shape.variant} network for {net.shape.kind}", REINSTALL)
+        raise InputError(path, f"weights of a {stored.title} of another shape, {net.shape}", REINSTALL)
     return net

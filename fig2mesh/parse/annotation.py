@@ -12,19 +12,11 @@ from PIL import Image, PngImagePlugin
 
 from exporters.write import write_whole
 from fig2mesh.parse.joint_writers import WRITERS
-from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray, DepthOrder, Figure, FloatArray
+from fig2mesh.records import BoolArray, ByteArray, DepthOrder, Figure, FloatArray
+from fig2mesh.skeleton import JOINT_NAMES, LABEL_COLOURS, PART_NAMES
 
 KEYPOINTS, MASK, PART_LABELS = "keypoints.json", "mask.png", "part_labels.png"
 """Names of the files in a folder of annotations; the main job's options of the same names read them."""
-
-# fmt: off
-COLOURS = (
-    (0, 0, 0), (230, 159, 0), (240, 228, 66), (86, 180, 233), (0, 114, 178), (120, 200, 240), (60, 90, 200),
-    (170, 220, 255), (110, 130, 230), (0, 158, 115), (204, 121, 167), (110, 200, 120), (230, 150, 190), (170, 230, 150),
-    (250, 190, 215), (120, 80, 40), (213, 94, 0), (150, 150, 150),
-)
-# fmt: on
-"""Colour of each label of `PART_NAMES` in pictures and pages: left limbs blue and green, right ones violet and pink."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +81,7 @@ def save_annotation(
     (folder / KEYPOINTS).write_text(json.dumps(joints, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     Image.fromarray(np.where(annotation.mask, np.uint8(255), np.uint8(0))).save(folder / MASK)
     labels = Image.fromarray(np.where(annotation.mask, annotation.part_labels, np.uint8(0)))
-    labels.putpalette([value for colour in COLOURS for value in colour])
+    labels.putpalette([value for colour in LABEL_COLOURS for value in colour])
     text = PngImagePlugin.PngInfo()
     text.add_text("legend", json.dumps(dict(enumerate(PART_NAMES))))
     labels.save(folder / PART_LABELS, pnginfo=text, optimize=False)

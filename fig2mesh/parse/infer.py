@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from fig2mesh.parse.joints import decode, doubts, visible_inside
 from fig2mesh.parse.silhouette import refine
-from fig2mesh.records import PART_NAMES, BoolArray, ByteArray, FloatArray
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import BoolArray, ByteArray, FloatArray
+from fig2mesh.skeleton import JOINT_MIRROR, PART_MIRROR, PART_NAMES
 
 ROOM: Final = 0.12
 """Space round the figure in the second look, share of its size."""
@@ -24,10 +24,6 @@ PLAIN_RIM: Final = 0.7
 
 FINEST: Final = 320
 """Cells a side in which part labels are told apart; the network's own are a third as fine."""
-
-PART_MIRROR: Final = tuple(
-    PART_NAMES.index({"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]) for name in PART_NAMES
-)
 
 REMEDY: Final = "look at what `fig2mesh parse` writes, correct keypoints.json or mask.png, and pass them"
 
@@ -127,8 +123,9 @@ def look(rgb: ByteArray, centre: NDArray[np.floating], edge: float) -> Look:
     low = np.asarray(centre, float) - edge / 2
     picture = square(rgb, low, edge, figure_parser.INPUT).astype(np.float32) / 255
     batch = torch.from_numpy(np.stack([picture, picture[:, ::-1]]).transpose(0, 3, 1, 2).copy())
+    net = figure_parser.PARSER_WEIGHTS.shipped(figure_parser.SHIPPED)
     with torch.inference_mode():
-        found = figure_parser.load()(batch.contiguous(memory_format=torch.channels_last))
+        found = net(batch.contiguous(memory_format=torch.channels_last))
     likely = found.silhouette.sigmoid().numpy()
     labels = found.labels.softmax(dim=1).numpy()
     heat = found.heat.flatten(2).softmax(dim=2).reshape(found.heat.shape).numpy()

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT_NAMES
+from fig2mesh.skeleton import JOINT_NAMES
 
 Point = NDArray[np.float64]
 

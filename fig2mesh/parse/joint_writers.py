@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fig2mesh.records import JOINT_NAMES, BoolArray, FloatArray
+from fig2mesh.records import BoolArray, FloatArray
+from fig2mesh.skeleton import BONES, JOINT_NAMES
 
 Document = dict[str, Any]
 Writer = Callable[[FloatArray, BoolArray, tuple[int, int], str], Document]
@@ -16,19 +17,6 @@ LONG_NAMES = tuple(
 )
 # fmt: on
 """left_shoulder instead of l_shoulder, as data sets have it."""
-
-# fmt: off
-SKELETON = (
-    ("head", "eyes"), ("head", "neck"), ("neck", "thorax"), ("thorax", "pelvis"),
-    *(
-        (f"{side}_{start}" if start not in ("thorax", "pelvis") else start, f"{side}_{end}")
-        for side in "lr"
-        for start, end in (("thorax", "shoulder"), ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "hand"),
-                           ("pelvis", "hip"), ("hip", "knee"), ("knee", "ankle"), ("ankle", "foot"))
-    ),
-)
-# fmt: on
-"""The bones, as pairs of joint names."""
 
 
 def as_ours(joints: FloatArray, visible: BoolArray, size: tuple[int, int], picture: str) -> Document:
@@ -55,7 +43,7 @@ def as_coco(joints: FloatArray, visible: BoolArray, size: tuple[int, int], pictu
                 "name": "person",
                 "supercategory": "person",
                 "keypoints": list(LONG_NAMES),
-                "skeleton": [[place[start], place[end]] for start, end in SKELETON],
+                "skeleton": [[place[start], place[end]] for start, end in BONES],
             },
         ],
         "annotations": [

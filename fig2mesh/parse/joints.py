@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.records import JOINT, JOINT_NAMES, BoolArray, FloatArray
+from fig2mesh.records import BoolArray, FloatArray
+from fig2mesh.skeleton import JOINT, JOINT_NAMES, LIMB_BONES, LIMB_JOINTS
 
 NEAR: Final = 2
 """Cells round a peak that count for its place and its likelihood."""
-
-CHAINS: Final = (("shoulder", "elbow", "wrist", "hand"), ("hip", "knee", "ankle", "foot"))
 
 APART: Final = 0.06
 """Two joints of a pair nearer than this share of the figure's height may be one place found twice."""
@@ -21,12 +20,8 @@ APART: Final = 0.06
 UNSURE: Final = 0.3
 """Likelihood below which a joint is reported."""
 
-# fmt: off
-BONES: Final = {
-    "upper arm": ("shoulder", "elbow"), "lower arm": ("elbow", "wrist"), "upper leg": ("hip", "knee"),
-    "lower leg": ("knee", "ankle"),
-}
-# fmt: on
+MEASURED: Final = ("upper_arm", "lower_arm", "upper_leg", "lower_leg")
+"""Parts whose bones are compared, left with right; hands and feet are drawn too freely."""
 
 UNEVEN: Final = 3.0
 """Left and right bones whose drawn lengths differ by more than this factor are reported where neither is short."""
@@ -41,7 +36,7 @@ def decode(heat: FloatArray, tall: float) -> tuple[NDArray[np.float64], NDArray[
     places, sure = np.empty((len(heat), 2)), np.empty(len(heat))
     for joint, share in enumerate(heat):
         places[joint], sure[joint] = peak(share)
-    for chain in CHAINS:
+    for chain in LIMB_JOINTS.values():
         _sides(heat, places, sure, chain, tall)
     return places, sure
 
@@ -157,10 +152,11 @@ def doubts(joints: NDArray[np.floating], sure: NDArray[np.floating], visible: Bo
     outside = [JOINT_NAMES[i] for i in np.flatnonzero(visible & (away[row, column] > 0.03 * tall))]
     if outside:
         said.append(f"{_listed(outside)} outside the silhouette")
-    for bone, (start, end) in BONES.items():
+    for part in MEASURED:
+        start, end = LIMB_BONES[part]
         lengths = [float(np.linalg.norm(joints[JOINT[f"{s}_{start}"]] - joints[JOINT[f"{s}_{end}"]])) for s in "lr"]
         if min(lengths) > 0.04 * tall and max(lengths) > UNEVEN * min(lengths):
-            said.append(f"{bone}s of very different lengths")
+            said.append(f"{part.replace('_', ' ')}s of very different lengths")
     return said
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_formats import Box, NamedPoints, named_points
 from fig2mesh.parse.joint_names import completed
-from fig2mesh.records import JOINT_NAMES, LIMBS, BoolArray, DepthOrder, FloatArray
+from fig2mesh.records import BoolArray, DepthOrder, FloatArray
+from fig2mesh.skeleton import JOINT_NAMES, LIMBS
 from georef.untrusted.json_file import read_json
 
 MAX_BYTES = 4 << 20

@@ -13,7 +13,8 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 from exporters.texture_files import check_scans
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, size_of
-from fig2mesh.records import PART_NAMES, BoolArray, ByteArray
+from fig2mesh.records import BoolArray, ByteArray
+from fig2mesh.skeleton import PART_NAMES
 
 OPAQUE = np.array([0, 0, 0, 255], np.uint8)
 

@@ -12,7 +12,8 @@ import numpy as np
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.keypoints import Joints, read_keypoints
 from fig2mesh.parse.picture import View, on_white, read_labels, read_mask, read_view
-from fig2mesh.records import JOINT_NAMES, BoolArray, ByteArray, Figure, FloatArray
+from fig2mesh.records import BoolArray, ByteArray, Figure, FloatArray
+from fig2mesh.skeleton import JOINT_NAMES
 
 if TYPE_CHECKING:
     from fig2mesh.parse.infer import Inference

@@ -116,7 +116,7 @@ def _promising(rgb: ByteArray, edge: float) -> Iterator[NDArray[np.float64]]:
 
     from fig2mesh.nets import figure_parser
 
-    net = figure_parser.load()
+    net = figure_parser.PARSER_WEIGHTS.shipped(figure_parser.SHIPPED)
     centres = _centres(rgb.shape, edge)
     for start in range(0, len(centres), BATCH):
         part = centres[start : start + BATCH]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.split import Split, head_radius
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 
 STEEPEST = 1.4
 """Bones that run more steeply in depth than this (54 degrees) make their layer no thicker still."""

@@ -7,24 +7,22 @@ contour, which stays as it is; a hand on a hip keeps its crease.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 
 from fig2mesh.field.blend import blend
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.records import PART, PartSdf
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import PART, PART_NEIGHBOURS, SIDES
 
 RADIUS = 0.04
 """Surfaces nearer to each other than this melt together, FIGURE units; less where a part is thinner."""
 
-CHAINS = (
-    ("torso", "head"),
-    *(("torso", f"{s}_upper_arm", f"{s}_lower_arm", f"{s}_hand") for s in "lr"),
-    *(("torso", f"{s}_upper_leg", f"{s}_lower_leg", f"{s}_foot") for s in "lr"),
-    *(("garment", f"{s}_{leg}_leg") for s in "lr" for leg in ("upper", "lower")),
-)
-NEIGHBOURS = {frozenset((PART[a], PART[b])) for chain in CHAINS for a, b in pairwise(chain)}
+NEIGHBOURS = PART_NEIGHBOURS | {
+    frozenset((PART["garment"], PART[f"{side}_{leg}"])) for side in SIDES for leg in ("upper_leg", "lower_leg")
+}
+"""Pairs of part labels between which fillets are laid."""
 
 
 def make_fillets(

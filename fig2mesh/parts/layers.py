@@ -11,23 +11,18 @@ from scipy import ndimage
 from fig2mesh.parts.bones import Bones, core_bones, out_of_cloth
 from fig2mesh.parts.canvas import Canvas, raster_distance
 from fig2mesh.parts.depth import mid_surface, place_limb
+from fig2mesh.parts.distances import closing
 from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
+from fig2mesh.parts.loads import load_of, part_loads
 from fig2mesh.parts.profile import Profile, measure_profile
 from fig2mesh.parts.props import prop_depth
 from fig2mesh.parts.rim import RIM_BLUR, extended, rim_distance
-from fig2mesh.parts.split import Layer, Split, closing
-from fig2mesh.records import JOINT, PART, PART_NAMES, PartSdf
-
-LOAD = {"torso": 0.95, "head": 3.0, "garment": 1.1, "foot": 2.2, "limb": 2.0}
-"""Right-hand side of the inflation by kind of part: 2 makes a strip as deep as wide, 1 about 0.7 times; a torso is
-two thirds as deep as wide, a head nearly a ball."""
-
-FRONTAL_FOOT = 4.0
-"""What a foot that points to the viewer has on top of that: it is longer than the drawing shows it wide."""
-
+from fig2mesh.parts.split import Layer, Split
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import JOINT, PART
 
 STANDING = 0.12
 """Feet whose tip is at most this far above the lowest point of the figure stand on the ground, FIGURE units."""
@@ -161,7 +156,7 @@ class _Inflation:
             rows = ((0, ends.extra), (0, 0))
             labels = np.where(ends.beyond, below, np.pad(labels, rows))
             region = np.pad(region, rows) | ends.beyond
-        load = _load(region, labels, self.loads, self.canvas.pitch)
+        load = load_of(region, labels, self.loads, self.canvas.pitch)
         steep = mid_surface(self.canvas, bones.points, bones.slope2)
         u = inflate(rim < 0, load, self.device, rim)[:height] * self.canvas.pitch**2
         if (labels == PART["head"]).any():
@@ -180,7 +175,7 @@ class _Inflation:
         head = labels == PART["head"]
         filled = closing(head, NOOK / pitch) | region
         _, nearest = ndimage.distance_transform_edt(~region, return_indices=True)
-        load = _load(filled, labels[tuple(nearest)], self.loads, pitch)
+        load = load_of(filled, labels[tuple(nearest)], self.loads, pitch)
         outer = np.minimum(rim, ndimage.gaussian_filter(raster_distance(filled), RIM_BLUR / pitch) * pitch)
         smooth = inflate(outer < 0, load, self.device, outer) * pitch**2
         share = 1.0 - (1.0 - np.clip(rim / np.minimum(outer, -1e-9), 0.0, 1.0)) ** 3
@@ -279,23 +274,3 @@ def _extent(surface: LayerSurface) -> tuple[NDArray[np.float64], NDArray[np.floa
     there = (surface.u > 0) & (True if surface.clip is None else surface.clip < 0)
     half = np.where(there, np.sqrt(np.maximum(surface.u, 0.0)), np.nan)
     return surface.z0 + half, surface.z0 - half
-
-
-def part_loads(joints: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Right-hand side of the inflation for every part label."""
-    loads = np.array([LOAD.get(name, LOAD["limb"]) for name in PART_NAMES])
-    for side in "lr":
-        across, along = np.abs(joints[JOINT[f"{side}_foot"], :2] - joints[JOINT[f"{side}_ankle"], :2])
-        sideways = across / max(0.8 * float(np.hypot(across, along)), 1e-9)
-        loads[PART[f"{side}_foot"]] = LOAD["foot"] + FRONTAL_FOOT * max(0.0, 1.0 - float(sideways))
-    return loads
-
-
-def _load(
-    region: NDArray[np.bool_], labels: NDArray[np.uint8], loads: NDArray[np.float64], pitch: float
-) -> NDArray[np.float64]:
-    """(H, W) right-hand side of the inflation, without jumps between parts."""
-    values = np.where(region, loads[labels], 0.0)
-    blur = 0.03 / pitch
-    cover = ndimage.gaussian_filter(region.astype(float), blur)
-    return np.asarray(ndimage.gaussian_filter(values, blur) / np.maximum(cover, 1e-6))

@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.records import JOINT, PART, BoolArray
+from fig2mesh.records import BoolArray
+from fig2mesh.skeleton import JOINT, LIMB_JOINTS, LIMB_PARTS, PART
 
 SAMPLES = 12
 """Circles per bone."""
-
-JOINTS = {"arm": ("shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", "ankle", "foot")}
-PARTS = {"arm": ("upper_arm", "lower_arm", "hand"), "leg": ("upper_leg", "lower_leg", "foot")}
-LIMBS = ("l_leg", "r_leg", "l_arm", "r_arm")
 
 # fmt: off
 USUAL_RADIUS = {
@@ -99,8 +96,8 @@ def make_limb(name: str, joints: NDArray[np.float64], visible: BoolArray) -> Lim
     """The chain of a limb from (21, 3) FIGURE joints, with usual radii and nothing measured yet."""
     side, kind = name.split("_")
     centres, depth, usual, part, seen = [], [], [], [], []
-    chain = [JOINT[f"{side}_{joint}"] for joint in JOINTS[kind]]
-    for bone, (start, end) in zip(PARTS[kind], pairwise(chain), strict=True):
+    chain = [JOINT[f"{side}_{joint}"] for joint in LIMB_JOINTS[kind]]
+    for bone, (start, end) in zip(LIMB_PARTS[kind], pairwise(chain), strict=True):
         count = SAMPLES if bone not in ("hand", "foot") else SAMPLES // 2
         t = (np.arange(count) + 0.5) / count
         span = joints[start] + t[:, None] * (joints[end] - joints[start])
@@ -185,3 +182,9 @@ def complete(limb: Limb, twin: Limb, stout: float, pitch: float) -> Limb:
         ratio = np.interp(np.arange(len(ratio)), np.flatnonzero(known), ratio[known])
     smooth = np.convolve(np.pad(ratio * limb.usual, 2, mode="edge"), np.ones(5) / 5, mode="valid")
     return replace(limb, radius=np.maximum(smooth, pitch))
+
+
+def twins(limbs: list[Limb]) -> list[Limb]:
+    """The limb of the other side for each limb."""
+    by_name = {limb.name: limb for limb in limbs}
+    return [by_name[("r" if limb.name[0] == "l" else "l") + limb.name[1:]] for limb in limbs]

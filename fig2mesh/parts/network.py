@@ -19,8 +19,8 @@ from fig2mesh.field.distance import grid_distance
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.split import Split
-from fig2mesh.records import BODY_PARTS, PART, BoolArray, FloatArray, PartSdf, Pose3D
-from fig2mesh.skeleton import KINDS, PART_KIND, anchor_joints, part_centre
+from fig2mesh.records import BoolArray, FloatArray, PartSdf, Pose3D
+from fig2mesh.skeleton import BODY_PARTS, KINDS, PART, PART_KIND, anchor_joints, part_centre
 
 if TYPE_CHECKING:
     from fig2mesh.nets.disn import Disn
@@ -153,9 +153,9 @@ def part_inference(
     """
     import torch
 
-    from fig2mesh.nets import weights
+    from fig2mesh.nets.disn import PART_WEIGHTS, DisnShape
 
-    nets = {kind: weights.load(kind).to(device) for kind in KINDS}
+    nets = {kind: PART_WEIGHTS.shipped(DisnShape(kind)).to(device) for kind in KINDS}
     sizes = shipped_sizes()
     joints = pose.joints.astype(np.float64)
 
@@ -168,9 +168,9 @@ def part_inference(
 
 def shipped_sizes() -> dict[str, PartSizeNet]:
     """The size networks that come with the package, by kind, loaded once a process."""
-    from fig2mesh.nets import part_size
+    from fig2mesh.nets.part_size import SIZE_WEIGHTS, SizeShape
 
-    return {kind: part_size.load(kind) for kind in KINDS}
+    return {kind: SIZE_WEIGHTS.shipped(SizeShape(kind)) for kind in KINDS}
 
 
 def hidden_parts(

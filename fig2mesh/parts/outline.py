@@ -24,7 +24,8 @@ from fig2mesh.parts.inflate import single_threaded
 from fig2mesh.parts.layers import LayerSurface, raise_layers
 from fig2mesh.parts.network import hidden_parts
 from fig2mesh.parts.split import Split, split
-from fig2mesh.records import BODY_PARTS, PART, BoolArray, PartSdf, Pose3D
+from fig2mesh.records import BoolArray, PartSdf, Pose3D
+from fig2mesh.skeleton import BODY_PARTS, PART
 
 OVERLAP = 0.025
 """How far neighbouring parts of one layer reach into each other, FIGURE units."""

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import Limb
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 
 OWN_SHARE = 0.3
 """A piece cut off from its layer is no mistake where this share of it lies along the layer's bones."""

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.records import PART, PartSdf
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import PART
 
 DETAIL = 0.04
 """Spread of the average over neighbouring columns of a part, FIGURE units: finer detail of a network is noise."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 
 GRIP = 0.09
 """Pieces up to twice as far apart belong to one thing that goes on behind the hand between them, FIGURE units."""

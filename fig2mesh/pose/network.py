@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from fig2mesh.counters import count
 from fig2mesh.image_frame import ImageFrame
-from fig2mesh.records import JOINT, Figure, Pose3D
+from fig2mesh.records import Figure, Pose3D
+from fig2mesh.skeleton import JOINT, LIMB_JOINTS
 
 STRAIGHT = 0.8
 """A figure stands on a leg that reaches down by this share of its length; a seated one does not."""
@@ -21,11 +22,11 @@ WEIGHTS = {"head": 0.1, "thorax": 0.45, "pelvis": 0.45}
 
 def lift_by_network(figure: Figure, frame: ImageFrame) -> Pose3D:
     """Joints in FIGURE: x and y exactly as drawn, z from the shipped network, 0 at the pelvis."""
-    from fig2mesh.nets.pose_lift import SHIPPED, lift_joints, load
+    from fig2mesh.nets.pose_lift import POSE_WEIGHTS, SHIPPED, lift_joints
 
     count("pose network")
     drawn = np.asarray(frame.figure_from_image(figure.joints_px), np.float32)
-    joints = lift_joints(load(), drawn, figure.visible if SHIPPED.visibility else None)
+    joints = lift_joints(POSE_WEIGHTS.shipped(SHIPPED), drawn, figure.visible if SHIPPED.visibility else None)
     return Pose3D(upright(joints))
 
 
@@ -36,7 +37,7 @@ def upright(joints: NDArray[np.float32]) -> NDArray[np.float32]:
     nobody draws people who fall over. The weight is brought over the foot on which the figure stands, by a shear, so
     that x and y stay.
     """
-    legs = [[joints[JOINT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle", "foot")] for side in "lr"]
+    legs = [[joints[JOINT[f"{side}_{name}"]] for name in LIMB_JOINTS["leg"]] for side in "lr"]
     hip, knee, ankle, foot = min(legs, key=lambda leg: float(leg[2][1]))
     length = float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
     if hip[1] - ankle[1] < STRAIGHT * length or length < 1e-6:

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fig2mesh.records import JOINT, DepthOrder, Pose3D
-
-CHAINS = {"arm": ("shoulder", "elbow", "wrist", "hand"), "leg": ("hip", "knee", "ankle", "foot")}
+from fig2mesh.records import DepthOrder, Pose3D
+from fig2mesh.skeleton import JOINT, LIMB_JOINTS
 
 LEAST = {"elbow": 0.10, "wrist": 0.20, "hand": 0.22, "knee": 0.08, "ankle": 0.10, "foot": 0.10}
 """How far from the root of the limb, in depth, its joints are at least, FIGURE units. Half a chest is 0.12 deep."""
@@ -17,7 +16,7 @@ LEAST = {"elbow": 0.10, "wrist": 0.20, "hand": 0.22, "knee": 0.08, "ankle": 0.10
 def ordered(pose: Pose3D, order: Mapping[str, DepthOrder]) -> Pose3D:
     """The pose with the limbs of `order` brought before or behind the body.
 
-    order : limb (`fig2mesh.records.LIMBS`) → "front" or "behind"
+    order : limb (`fig2mesh.skeleton.LIMBS`) → "front" or "behind"
 
     Seen from the front a bone that leans towards the viewer looks like one that leans away by as much; each bone of the
     limb gets the sign asked for, and where it hardly leans, enough depth to be clear of the body. x and y stay.
@@ -28,9 +27,9 @@ def ordered(pose: Pose3D, order: Mapping[str, DepthOrder]) -> Pose3D:
     for limb, where in order.items():
         side, kind = limb.split("_")
         sign = 1.0 if where == "front" else -1.0
-        chain = [JOINT[f"{side}_{name}"] for name in CHAINS[kind]]
+        chain = [JOINT[f"{side}_{name}"] for name in LIMB_JOINTS[kind]]
         root = pose.joints[chain[0], 2]
         leans = np.abs(np.diff(pose.joints[chain, 2]))
-        for joint, name, lean in zip(chain[1:], CHAINS[kind][1:], np.cumsum(leans), strict=True):
+        for joint, name, lean in zip(chain[1:], LIMB_JOINTS[kind][1:], np.cumsum(leans), strict=True):
             joints[joint, 2] = root + sign * max(float(lean), LEAST[name])
     return Pose3D(joints)

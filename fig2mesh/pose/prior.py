@@ -11,7 +11,8 @@ import math
 import numpy as np
 
 from fig2mesh.image_frame import ImageFrame
-from fig2mesh.records import JOINT, Figure, Pose3D
+from fig2mesh.records import Figure, Pose3D
+from fig2mesh.skeleton import JOINT, LIMB_BONES
 
 FORESHORTENED = 0.8
 """Limbs shorter than this share of their twin lean; nearer lengths are the draughtsman's liberty."""
@@ -25,13 +26,9 @@ MOST = 0.30
 EYES_FORWARD = 0.08
 FOOT_FORWARD = 0.05
 
-LEANS = {
-    "upper_arm": ("shoulder", "elbow", 1.0),
-    "lower_arm": ("elbow", "wrist", 1.0),
-    "upper_leg": ("hip", "knee", 1.0),
-    "lower_leg": ("knee", "ankle", -1.0),
-}
-"""Bone → its joints and the direction in which it leans when foreshortened (+1: to the viewer)."""
+
+LEANS = {"upper_arm": 1.0, "lower_arm": 1.0, "upper_leg": 1.0, "lower_leg": -1.0}
+"""Part → the direction in which its bone leans when foreshortened (+1: to the viewer)."""
 
 
 def lift(figure: Figure, frame: ImageFrame) -> Pose3D:
@@ -43,7 +40,8 @@ def lift(figure: Figure, frame: ImageFrame) -> Pose3D:
     joints[:, :2] = frame.figure_from_image(figure.joints_px)
     joints[JOINT["eyes"], 2] = EYES_FORWARD
     for side, twin in ("lr", "rl"):
-        for first, second, direction in LEANS.values():
+        for part, direction in LEANS.items():
+            first, second = LIMB_BONES[part]
             start, end = JOINT[f"{side}_{first}"], JOINT[f"{side}_{second}"]
             own = _length(joints, start, end)
             expected = _length(joints, JOINT[f"{twin}_{first}"], JOINT[f"{twin}_{second}"])

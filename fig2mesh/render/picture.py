@@ -19,7 +19,6 @@ from fig2mesh.render.scene import CLEARANCE, FieldScene, Floats, Scene, Surface,
 from fig2mesh.render.shading import (
     CLAY,
     GROUND,
-    PART_COLOURS,
     fill_direction,
     head_light,
     hemisphere,
@@ -29,6 +28,7 @@ from fig2mesh.render.shading import (
     turns_at,
 )
 from fig2mesh.render.view import View, ground_radius, make_view
+from fig2mesh.skeleton import PART_COLOURS
 
 RAYS_AT_ONCE = 1 << 19
 """Pictures are made in bands of rows with so many rays: some 100 MB."""

@@ -27,16 +27,6 @@ HEAD_LIGHT = (-0.30, 0.45, 0.84)
 CLAY = (206.0, 190.0, 174.0)
 GROUND = (232.0, 230.0, 226.0)
 
-# fmt: off
-PART_COLOURS: tuple[tuple[int, int, int], ...] = (
-    (160, 160, 160), (203, 171, 96), (233, 150, 122),
-    (76, 145, 203), (118, 190, 98), (44, 104, 168), (74, 150, 62), (144, 196, 232), (170, 224, 150),
-    (132, 104, 188), (206, 104, 148), (98, 68, 156), (168, 62, 110), (180, 158, 222), (236, 164, 194),
-    (120, 80, 50), (70, 160, 160), (96, 96, 104),
-)
-# fmt: on
-"""sRGB of each part label: one hue each for a side's arm and leg, darker downwards, light hands and feet."""
-
 
 def key_direction(yaw_deg: float) -> Floats:
     """(3,) unit vector towards the lamp of `light`, seen from a camera at this yaw."""

@@ -8,7 +8,8 @@ from scipy import ndimage
 
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.parts.outline import Outline
-from fig2mesh.records import JOINT, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT
 from fig2mesh.texture.pen import STROKE
 
 FACE_SHARE = 1.05

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes, images, orthographic
 from fig2mesh.field.trace import trace
-from fig2mesh.records import JOINT, PART, Pose3D
+from fig2mesh.records import Pose3D
+from fig2mesh.skeleton import JOINT, PART
 
 SIZE: Final = 256
 FILLED: Final = 0.9

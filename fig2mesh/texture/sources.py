@@ -17,7 +17,8 @@ from scipy.cluster.vq import kmeans2
 
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.parts.outline import Outline
-from fig2mesh.records import PART, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.heads import back_of_head, drawn_face
 from fig2mesh.texture.patterns import patterned
 from fig2mesh.texture.pen import DARK, Pen, find_pen, reinked, without_contour

@@ -22,7 +22,8 @@ from fig2mesh.nets.head_hsv import HeadHsv, enhance
 from fig2mesh.nets.texture_fill import TextureFill, fill_inputs, sample
 from fig2mesh.nets.uv_unet import UvUnet, infer_uv
 from fig2mesh.nets.view_refine import ViewRefine, refine
-from fig2mesh.records import PART, Pose3D
+from fig2mesh.records import Pose3D
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.sides import Sides, look_around
 from fig2mesh.texture.space import inwards, shown_alike, spread, trust
 from fig2mesh.texture.votes import Unseen
@@ -60,9 +61,10 @@ class TextureNets:
 
 def shipped() -> TextureNets:
     """The networks that come with the package."""
-    from fig2mesh.nets import texture_fill, uv_unet
+    from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
+    from fig2mesh.nets.uv_unet import SHIPPED, UV_WEIGHTS
 
-    return TextureNets(uv_unet.load(), texture_fill.load())
+    return TextureNets(UV_WEIGHTS.shipped(SHIPPED), FILL_WEIGHTS.shipped(FillShape()))
 
 
 def texture_coordinates(sides: Sides, net: UvUnet) -> NDArray[np.float32]:

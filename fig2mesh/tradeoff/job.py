@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.evaluate.figures import Drawing, drawing_in
 from fig2mesh.field.body import Body
-from fig2mesh.measure.figures import Drawing, drawing_in
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
 

@@ -12,7 +12,7 @@ import numpy as np
 from exporters.asset import TexturedMesh
 from fig2mesh.records import Figure
 from fig2mesh.settings import PRESETS, Settings
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.skeleton import FIGURE_HEIGHT
 
 FINEST: Final = replace(PRESETS["fine"], voxel=0.004, spacing=0.005, triangles=120_000)
 """What errors are measured against: finer than any value of the sweep, but for the texture, which is as fine."""

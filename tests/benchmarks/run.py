@@ -87,8 +87,8 @@ def levels(folder: Path) -> dict[str, dict[str, Any]]:
 def decoding() -> dict[str, dict[str, Any]]:
     """The 14 part fields of the farmer, coarse to fine and, a few parts only, node by node."""
     from fig2mesh.image_frame import image_frame
-    from fig2mesh.nets import weights
     from fig2mesh.nets.decode import decode_counted, decode_dense
+    from fig2mesh.nets.disn import PART_WEIGHTS, DisnShape
     from fig2mesh.parse.read import read_figure
     from fig2mesh.parts.canvas import make_canvas
     from fig2mesh.parts.network import network_inputs, shipped_sizes
@@ -101,7 +101,9 @@ def decoding() -> dict[str, dict[str, Any]]:
     canvas = make_canvas(figure, frame, 448)
     joints = lift_by_network(figure, frame).joints.astype(np.float64)
     inputs = network_inputs(canvas, split(canvas, joints, figure.visible), joints, shipped_sizes())
-    work = [(weights.load(PART_KIND[part]), given.mask, given.anchors) for part, given in inputs.items()]
+    work = [
+        (PART_WEIGHTS.shipped(DisnShape(PART_KIND[part])), given.mask, given.anchors) for part, given in inputs.items()
+    ]
     counts = [decode_counted(*part).evaluated for part in work]
     fast = statistics.median(_seconds(lambda: [decode_counted(*part) for part in work]) for _ in range(3))
     dense = statistics.median(_seconds(lambda: [decode_dense(*part) for part in work]) for _ in range(3))

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 from scipy import ndimage
 
-from fig2mesh.records import JOINT_NAMES
+from fig2mesh.skeleton import JOINT_NAMES
 
 pytest.importorskip("resvg_py")
 

@@ -19,7 +19,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.measure.front import flange_share, look
 from fig2mesh.measure.solid import inner_shells
 from fig2mesh.mesh.topology import check_solid
-from fig2mesh.records import JOINT, PART, PART_NAMES
+from fig2mesh.skeleton import JOINT, PART, PART_NAMES
 from tests.drawn import Assembled, Sketch, assemble
 
 VOXEL = 0.012

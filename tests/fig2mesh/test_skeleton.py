@@ -5,8 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fig2mesh.records import BODY_PARTS, JOINT, JOINT_NAMES, PART
-from fig2mesh.skeleton import ANCHORS, JOINT_MIRROR, KINDS, MIRRORED, PART_KIND, anchor_joints, part_centre
+from fig2mesh.skeleton import (
+    ANCHORS,
+    BODY_PARTS,
+    JOINT,
+    JOINT_MIRROR,
+    JOINT_NAMES,
+    KINDS,
+    MIRRORED,
+    PART,
+    PART_KIND,
+    anchor_joints,
+    part_centre,
+)
 
 
 def test_fourteen_parts_are_of_eight_kinds() -> None:

@@ -123,7 +123,7 @@ def scans() -> Iterator[Input]:
 def joints() -> Iterator[Input]:
     """Joints files of all four formats."""
     from fig2mesh.parse.joint_writers import WRITERS
-    from fig2mesh.records import JOINT_NAMES
+    from fig2mesh.skeleton import JOINT_NAMES
 
     points = np.arange(42, dtype=np.float32).reshape(21, 2) * 2 + 5
     ours = {name: [*point, 1] for name, point in zip(JOINT_NAMES, points.tolist(), strict=True)}

@@ -19,8 +19,9 @@ from fig2mesh.mesh.solid import make_solid
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import outline_parts
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import JOINT_NAMES, Figure
+from fig2mesh.records import Figure
 from fig2mesh.settings import PRESETS
+from fig2mesh.skeleton import JOINT_NAMES
 from tests.drawn import JOINTS, SIZE, Assembled, draw_figure
 
 SKIN = (200, 160, 140, 255)

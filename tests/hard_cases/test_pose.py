@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.topology import check_solid
 from fig2mesh.pose.network import lift_by_network
-from fig2mesh.records import JOINT_NAMES, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT_NAMES
 from tests.hard_cases.case import Worst, drawn, hard_case
 from tests.hard_cases.figures import Job, drawn_mask, figure_of, joints_on, painted, refused, solid_of
 

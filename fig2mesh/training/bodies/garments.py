@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import PART, _Checked
-from fig2mesh.training.bodies.anny_body import AnnyBodies, _read_groups
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import PART
+from fig2mesh.training.bodies.anny_body import AnnyBodies
+from fig2mesh.training.bodies.obj_groups import read_groups
 
 REACH = {"cloth": 0.07, "shoe": 0.05, "hair": 0.16, "hat": 0.20}
 """How far from the skin a garment may lie and still be told as an offset, metres on a body of 1.79 m."""
@@ -91,7 +93,7 @@ def read_garments(bodies: AnnyBodies, assets: Path | None) -> tuple[Garment, ...
 def _fit(bodies: AnnyBodies, path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
     """A garment's vertices on the mean body, and its triangles; None where it hangs on helpers that are not kept."""
     scales, rows = _read_mhclo(path)
-    faces, _, _, _ = _read_groups(path.with_suffix(".obj"))
+    faces, _, _, _ = read_groups(path.with_suffix(".obj"))
     full = bodies.full
     bound = rows[:, :3].astype(int)
     size = [abs(full[scales[axis][0], k] - full[scales[axis][1], k]) / scales[axis][2] for k, axis in enumerate("xyz")]

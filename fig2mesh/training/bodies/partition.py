@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import BODY_PARTS
+from fig2mesh.skeleton import BODY_PARTS
 from fig2mesh.training.bodies.rig import Rig
 
 RINGS = 2

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT_NAMES, _Checked
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import JOINT_NAMES, other_side
 
 # fmt: off
 KEYS: tuple[str, ...] = (
@@ -26,7 +27,7 @@ KEYS: tuple[str, ...] = (
 
 KEY: dict[str, int] = {name: index for index, name in enumerate(KEYS)}
 
-KEY_MIRROR: tuple[int, ...] = tuple(KEY[{"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]] for name in KEYS)
+KEY_MIRROR: tuple[int, ...] = tuple(KEY[other_side(name)] for name in KEYS)
 """Index of the same key on the other side."""
 
 # fmt: off

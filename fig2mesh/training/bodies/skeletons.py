@@ -16,15 +16,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from fig2mesh.records import JOINT, JOINT_NAMES, _Checked
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import _Checked
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_MIRROR, JOINT_NAMES
+from fig2mesh.training.bodies.occlusion import occluded
 from fig2mesh.training.bodies.rig import KEY, KEYS, T_POSE, PoseSet, Rig, swing
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
-PELVIS, HEAD, EYES = JOINT["pelvis"], JOINT["head"], JOINT["eyes"]
+PELVIS, EYES = JOINT["pelvis"], JOINT["eyes"]
 
-AVERTED: Final = 0.3
-"""A head whose eyes lie further behind its middle than this share of their distance is seen from behind."""
 
 FACELESS: Final = 0.4
 """Share of heads turned to the viewer that are drawn without eyes: pictograms, blobs."""
@@ -166,29 +164,6 @@ class Sampler:
         return Sample(joints, drawn, visible)
 
 
-def occluded(joints: Tensor, stoutness: Tensor) -> Tensor:
-    """(N, 21) bool: joints that a body of capsules hides from the viewer, and the eyes of averted heads.
-
-    joints : (N, 21, 3), z to the viewer; stoutness : (N,) factor of the capsules' usual radii
-    """
-    start, end = joints[:, list(_STARTS)], joints[:, list(_ENDS)]
-    radius = joints.new_tensor(_RADII) * stoutness[:, None]
-    along = end - start
-    flat = along[..., :2]
-    offset = joints[:, :, None, :2] - start[:, None, :, :2]
-    t = (offset * flat[:, None]).sum(dim=3) / flat.square().sum(dim=2).clamp_min(1e-6)[:, None]
-    t = t.clamp(0, 1)
-    away2 = (offset - t[..., None] * flat[:, None]).square().sum(dim=3)
-    rise2 = radius.square()[:, None] - away2
-    front = start[:, None, :, 2] + t * along[:, None, :, 2] + rise2.clamp_min(0).sqrt()
-    own = joints[..., 2] + joints.new_tensor(_JOINT_RADII) * stoutness[:, None]
-    other = ~torch.tensor(_OWN, device=joints.device)
-    hidden = ((rise2 > 0) & other & (front > own[..., None])).any(dim=2)
-    face = joints[:, EYES] - joints[:, HEAD]
-    hidden[:, EYES] |= face[:, 2] < -AVERTED * face.norm(dim=1)
-    return hidden
-
-
 def _reach(rig: Rig) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(21, 3) base and (21, 20, 3) reach of a rig: the offsets between bone heads, gathered by key."""
     keyed = {int(bone): key for key, bone in enumerate(rig.key_bone)}
@@ -250,38 +225,6 @@ def _about(axis: int, angle: Tensor) -> Tensor:
     result[:, first, second] = -torch.sin(angle)
     return result
 
-
-_TRUNK_JOINTS: Final = ("thorax", "pelvis", "neck", "l_shoulder", "r_shoulder", "l_hip", "r_hip")
-# fmt: off
-_CAPSULES: Final = (  # two joints and the usual radius, FIGURE units
-    ("thorax", "pelvis", 0.11), ("l_shoulder", "r_shoulder", 0.07), ("l_hip", "r_hip", 0.09),
-    ("l_shoulder", "l_hip", 0.07), ("r_shoulder", "r_hip", 0.07), ("neck", "head", 0.09),
-    *((f"{side}_{first}", f"{side}_{second}", radius) for side in "lr" for first, second, radius in (
-        ("shoulder", "elbow", 0.05), ("elbow", "wrist", 0.04), ("wrist", "hand", 0.04), ("hip", "knee", 0.075),
-        ("knee", "ankle", 0.055), ("ankle", "foot", 0.045),
-    )),
-)
-# fmt: on
-_STARTS: Final = tuple(JOINT[first] for first, _, _ in _CAPSULES)
-_ENDS: Final = tuple(JOINT[second] for _, second, _ in _CAPSULES)
-_RADII: Final = tuple(radius for _, _, radius in _CAPSULES)
-# fmt: off
-_JOINT_RADII: Final = tuple(
-    min(radius for first, second, radius in _CAPSULES if name in (first, second))
-    if any(name in capsule for capsule in _CAPSULES) else 0.09
-    for name in JOINT_NAMES
-)
-# fmt: on
-_OWN: Final = tuple(
-    tuple(
-        name in (first, second)
-        or (name in _TRUNK_JOINTS and first in _TRUNK_JOINTS and second in (*_TRUNK_JOINTS, "head"))
-        or (name == "eyes" and second == "head")
-        for first, second, _ in _CAPSULES
-    )
-    for name in JOINT_NAMES
-)
-"""(21, capsules) whether a capsule belongs to a joint and so cannot hide it."""
 
 _ONE_SIDE: Final = tuple(KEY["l_" + key[2:]] if key.startswith("r_") else KEY[key] for key in KEYS)
 # fmt: off

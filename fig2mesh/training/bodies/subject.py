@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT
 from fig2mesh.training.bodies.anny_body import AnnyBodies, random_body
 from fig2mesh.training.bodies.caricature import caricature, draw_proportions
 from fig2mesh.training.bodies.garments import Garment, wear
 from fig2mesh.training.bodies.pack import Pack, held_out
 from fig2mesh.training.bodies.partition import PartTopology, partition
 from fig2mesh.training.bodies.rig import Posture, Rig, axis_angle, posture
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 SPLITS = ("train", "valid-clips", "valid-characters")
 

@@ -9,17 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, LIMB_BONES, PART
 
 CANVAS: Final = 512
 """Pixels a side of what doodles are drawn on."""
-
-# fmt: off
-BONES: Final = {
-    "upper_arm": ("shoulder", "elbow"), "lower_arm": ("elbow", "wrist"), "hand": ("wrist", "hand"),
-    "upper_leg": ("hip", "knee"), "lower_leg": ("knee", "ankle"), "foot": ("ankle", "foot"),
-}
-# fmt: on
 
 
 @dataclass(frozen=True)
@@ -56,7 +49,7 @@ def shapes_of(
     depth = joints[:, 2] / max(tall, 1)
     bend = {f"{side}_{half}": rng.normal(0, manner.rubber) for side in "lr" for half in ("arm", "leg")}
     for side in "lr":
-        for kind, (start, end) in BONES.items():
+        for kind, (start, end) in LIMB_BONES.items():
             half = "arm" if kind in ("upper_arm", "lower_arm", "hand") else "leg"
             wide = limb * (1.0 if half == "arm" else rng.uniform(1.0, 1.3) if manner.kind != "stick" else 1.0)
             first, last = at[JOINT[f"{side}_{start}"]], at[JOINT[f"{side}_{end}"]]

@@ -9,12 +9,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, PART
+from fig2mesh.training.drawing.crop import MARGIN, Crop, cut, seen_joints
 from fig2mesh.training.drawing.doodle_shapes import CANVAS, Manner, pixel, shapes_of
 from fig2mesh.training.drawing.styles import BRIGHTS, HAIRS, INKS, MAP_TINTS, SKINS
 from fig2mesh.training.drawing.thing_shapes import Thing
 from fig2mesh.training.drawing.worn import things
-from fig2mesh.training.samples.crops import MARGIN, Crop, cut, seen_joints
 
 FILL: Final = 0.66
 """Share of the canvas that the skeleton takes."""

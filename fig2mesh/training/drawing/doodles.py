@@ -12,13 +12,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.skeletons import DRAWN, Sampler, Skeletons
+from fig2mesh.training.drawing.crop import Crop
 from fig2mesh.training.drawing.doodle_shapes import CANVAS, Manner
 from fig2mesh.training.drawing.doodle_sheet import FILL, draw_doodle
-from fig2mesh.training.samples.crops import Crop
 
 FILLED: Final = {"stick": 0.4, "pictogram": 1.0, "child": 0.45, "blob": 0.95, "cartoon": 0.85}
 ONE_COLOUR: Final = {"stick": 0.7, "pictogram": 0.85, "child": 0.5, "blob": 0.6, "cartoon": 0.1}

@@ -9,12 +9,12 @@ Measured on one core: 30 ms a picture of 256 x 256, 130 ms one of 512 x 512 shru
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.background import PLAIN, draw_background
 from fig2mesh.training.drawing.faces import Face, draw_face
 from fig2mesh.training.drawing.marks import Picture, blur, distance, lay, noise, warp
@@ -47,28 +47,25 @@ def draw(
     rng: np.random.Generator,
     *,
     style: Style | None = None,
-    colours: NDArray[Any] | None = None,
     face: Face | None = None,
-    grain: float | None = None,
     shrink: int = 1,
     paper: Picture | None = None,
 ) -> NDArray[np.uint8]:
     """(H / shrink, W / shrink, 3) uint8, opaque.
 
     materials : names, as `random_style` takes them; eyes count as skin, for faces are drawn, not seen
-    style : None for a random one; colours : (n_materials, 3) 0-255 for a random style, None to choose them
+    style : None for a random one
     face : where the face is; None when the viewer does not see it
-    grain : UV units that one figure height takes; None to measure it in this picture
     shrink : average this many pixels a side into one, for smooth edges
     paper : (H, W, 3) 0-255 what is drawn on; None to draw one of the style's kind
     """
-    style = random_style(materials, rng, colours) if style is None else style
+    style = random_style(materials, rng) if style is None else style
     layers = layers._replace(material=_without_eyes(layers.material, materials))
     seen = layers.material >= 0
     shape = (seen.shape[0], seen.shape[1])
     scale = shape[0] / 256
     paper = draw_background(style.background, shape, rng) if paper is None else paper
-    picture = _filled(paper, layers, seen, style, rng, grain)
+    picture = _filled(paper, layers, seen, style, rng)
     lines = ink(layers, style, rng)
     if face is not None:
         hair = style.colours[list(materials).index("hair")] if "hair" in materials else np.array([60, 44, 34])
@@ -151,7 +148,6 @@ def _filled(
     seen: NDArray[np.bool_],
     style: Style,
     rng: np.random.Generator,
-    grain: float | None,
 ) -> Picture:
     """The figure's areas on the paper, lines left out."""
     shape, scale = paper.shape[:2], paper.shape[0] / 256
@@ -164,7 +160,7 @@ def _filled(
         return lay(blank, style.ink, dark * np.float32(rng.random() < 0.4))
     colour = style.colours[np.maximum(layers.material, 0)]
     if style.fill != "hatched":
-        grain = uv_grain(layers) if grain is None else grain
+        grain = uv_grain(layers)
         for index, pattern in enumerate(style.patterns):
             if pattern is not None and (here := layers.material == index).any():
                 colour = lay(colour, pattern.colour, here * pattern_coverage(pattern, layers.uv, grain))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, ellipse, line, polygon, tall_of
 
 

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.training.bodies.garments import vertex_normals
 from fig2mesh.training.bodies.subject import Subject
 from fig2mesh.training.drawing.background import draw_background
 from fig2mesh.training.drawing.draw import Layers, draw
 from fig2mesh.training.drawing.faces import Face
 from fig2mesh.training.drawing.raster import Raster
+from fig2mesh.training.drawing.scene import VIEWS, scene
 from fig2mesh.training.drawing.styles import random_style
-from fig2mesh.training.samples.sample import VIEWS, scene
 
 SIZE = 256
 """Pixels of a picture's edge; §4.3 works at this size."""

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 
 Points = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, LIMB_PARTS, PART, SIDES
 from fig2mesh.training.drawing.draw import Layers
 from fig2mesh.training.drawing.held import held
 from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, ellipse, line, polygon, smooth, tall_of
@@ -20,7 +20,7 @@ from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, ellipse, l
 SHARES: Final = {"gown": 0.14, "cape": 0.07, "hair": 0.14, "hat": 0.2, "held": 0.28, "pack": 0.06}
 """How often each kind is worn or carried."""
 
-ARMS: Final = tuple(PART[f"{side}_{name}"] for side in "lr" for name in ("upper_arm", "lower_arm", "hand"))
+ARMS: Final = tuple(PART[f"{side}_{part}"] for side in SIDES for part in LIMB_PARTS["arm"])
 OVER, UNDER = 0.02, 0.4
 """How far before what it covers, and how far behind the body, a thing lies, FIGURE units."""
 

@@ -17,7 +17,8 @@ from fig2mesh.parts.layers import raise_layers
 from fig2mesh.parts.outline import Outline
 from fig2mesh.parts.split import split
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import JOINT, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT
 from fig2mesh.texture.sources import Sources, make_sources
 from fig2mesh.texture.space import inwards
 from fig2mesh.texture.unseen import LEAST_PX

@@ -12,12 +12,12 @@ from fig2mesh.field.body import Body
 from fig2mesh.field.distance import grid_distance
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.isosurface import isosurface
-from fig2mesh.records import BODY_PARTS, JOINT, JOINT_NAMES, Figure, Pose3D
-from fig2mesh.skeleton import anchor_joints
+from fig2mesh.records import Figure, Pose3D
+from fig2mesh.skeleton import BODY_PARTS, JOINT, JOINT_NAMES, anchor_joints
+from fig2mesh.training.bodies.occlusion import AVERTED
 from fig2mesh.training.bodies.pack import Pack
-from fig2mesh.training.bodies.skeletons import AVERTED
 from fig2mesh.training.bodies.subject import Subject, draw_subject
-from fig2mesh.training.samples.sample import scene
+from fig2mesh.training.drawing.scene import scene
 from fig2mesh.training.samples.sdf import signed_distance
 
 PICTURE = 512

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError
-from fig2mesh.measure.parser import score
 from fig2mesh.parse.infer import Inference, infer_figure, square
-from fig2mesh.records import JOINT_NAMES, PART_NAMES, BoolArray, ByteArray
+from fig2mesh.records import BoolArray, ByteArray
+from fig2mesh.skeleton import JOINT_NAMES, PART_NAMES
+from fig2mesh.training.evaluate.parser import score
 from fig2mesh.training.samples.crop_data import load_crops
 from fig2mesh.training.samples.crop_views import View, Viewer
 

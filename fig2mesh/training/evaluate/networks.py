@@ -12,11 +12,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from fig2mesh.nets import part_size, weights
-from fig2mesh.nets.disn import VARIANTS, Disn, DisnShape
-from fig2mesh.nets.pose_lift import SHIPPED, PoseLift, PoseLiftShape, pose_path, read_pose
-from fig2mesh.records import BODY_PARTS
-from fig2mesh.skeleton import KINDS, PART_KIND
+from fig2mesh.nets.disn import PART_WEIGHTS, VARIANTS, Disn, DisnShape
+from fig2mesh.nets.part_size import SIZE_WEIGHTS, SizeShape
+from fig2mesh.nets.pose_lift import POSE_WEIGHTS, SHIPPED, PoseLift, PoseLiftShape
+from fig2mesh.skeleton import BODY_PARTS, KINDS, PART_KIND
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.evaluate.paper import PART_IOU, PART_RMSE, POSE_SCORES, VARIANT_SCORES
 
@@ -93,7 +92,7 @@ def _pose_table(pack: Pack, runs: Path | None) -> str:
             rows.append((name, f"{theirs[0]:.2f}", f"{theirs[1]:.2f}", *ours))
     head = ("four sides, scale known", "paper RMSE mm", "paper PCK150 %", "RMSE mm", "PCK150 %")
     first = table(head, rows)
-    shipped, _ = read_pose(pose_path(SHIPPED))
+    shipped = POSE_WEIGHTS.shipped(SHIPPED)
     rows = []
     for view, title in (("sides", "four sides"), ("around", "any side"), ("drawn", "as drawings are")):
         one = sample(view, False)
@@ -115,8 +114,8 @@ def _pose_cells(scores: dict[str, float]) -> tuple[str, str]:
 
 
 def _pose_network(runs: Path | None, shape: PoseLiftShape) -> PoseLift | None:
-    found = sorted(runs.rglob(pose_path(shape).name)) if runs is not None else []
-    return read_pose(found[0])[0] if found else None
+    found = sorted(runs.rglob(POSE_WEIGHTS.path(shape).name)) if runs is not None else []
+    return POSE_WEIGHTS.read(found[0])[0] if found else None
 
 
 def _rule_scores(sample: Any) -> dict[str, float]:
@@ -140,13 +139,13 @@ def _variant_table(data: Path, runs: Path | None, bodies: int) -> str:
     rows = []
     for variant in names:
         shape = DisnShape.of("hand", variant)
-        files = sorted(runs.rglob(weights.disn_path(shape).name)) if runs is not None else []
+        files = sorted(runs.rglob(PART_WEIGHTS.path(shape).name)) if runs is not None else []
         files = [file for file in files if "table2" in file.parts] or files
         theirs = VARIANT_SCORES.get(variant)
         paper = (f"{theirs[0]:.3f}", f"{theirs[1]:.2f}") if theirs else ("", "")
         cells: list[str] = []
         for split in SPLITS:
-            scores = [_part_scores(weights.read_disn(file)[0], data, split, "visible", bodies) for file in files]
+            scores = [_part_scores(PART_WEIGHTS.read(file)[0], data, split, "visible", bodies) for file in files]
             cells += [_spread([s["rmse"] for s in scores], ".3f"), _spread([100 * s["iou"] for s in scores], ".1f")]
         rows.append((variant, *paper, str(len(files)), *cells))
     head = ["network", "paper RMSE", "paper IoU %", "runs"]
@@ -174,7 +173,7 @@ def _part_tables(data: Path, bodies: int) -> str:
     )
     rows = []
     for kind in KINDS:
-        net = weights.load(kind)
+        net = PART_WEIGHTS.shipped(DisnShape(kind))
         cells = [kind.replace("_", " "), f"{PART_RMSE[kind]:.3f}", f"{PART_IOU[kind]:.1f}"]
         for split in SPLITS:
             for mask in ("visible", "amodal"):
@@ -196,7 +195,9 @@ def _size_table(data: Path) -> str:
     for kind in KINDS:
         cells = []
         for split in SPLITS:
-            scores = size_scores(part_size.load(kind), Columns.of(read_sizes(data, split, kind), "cpu"))
+            scores = size_scores(
+                SIZE_WEIGHTS.shipped(SizeShape(kind)), Columns.of(read_sizes(data, split, kind), "cpu")
+            )
             cells += [f"{scores[name]:.1f}" for name in names]
         rows.append((kind.replace("_", " "), *cells))
     head = [f"{what}, {mask}" for what in ("depth", "edge") for mask in ("whole mask", "visible", "none")]

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from fig2mesh.nets import uv_unet
-from fig2mesh.nets.head_hsv import head_path, read_head
-from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
-from fig2mesh.nets.view_refine import read_refine, refine_path
-from fig2mesh.records import PART
+from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadShape
+from fig2mesh.nets.uv_unet import SHIPPED, UV_WEIGHTS, UvUnetShape
+from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
 from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
 from fig2mesh.training.evaluate.as_baked import baked_sides
@@ -185,8 +184,8 @@ def evaluate_textures(data: Path, runs: Path | None, bodies: int, say: Say = lam
 def _uv_table(data: Path, runs: Path | None, bodies: int) -> str:
     rows = []
     for masks, title in ((False, "depth"), (True, "depth × part masks (shipped)")):
-        files = sorted(runs.rglob(uv_path(UvUnetShape(masks)).name)) if runs is not None else []
-        net = uv_unet.load() if masks else read_uv(files[0])[0] if files else None
+        files = sorted(runs.rglob(UV_WEIGHTS.path(UvUnetShape(masks)).name)) if runs is not None else []
+        net = UV_WEIGHTS.shipped(SHIPPED) if masks else UV_WEIGHTS.read(files[0])[0] if files else None
         cells = []
         for split in SPLITS:
             if net is None:
@@ -205,12 +204,13 @@ def _networks(runs: Path | None) -> TextureNets:
     """The shipped networks, and those that refine what they paint where they have been trained."""
     nets = shipped()
     refining, heads = (
-        sorted(runs.rglob(path(Path()).name)) if runs is not None else [] for path in (refine_path, head_path)
+        sorted(runs.rglob(name)) if runs is not None else []
+        for name in (REFINE_WEIGHTS.path(RefineShape()).name, HEAD_WEIGHTS.path(HeadShape()).name)
     )
     return replace(
         nets,
-        refine=read_refine(refining[0])[0] if refining else None,
-        head=read_head(heads[0])[0] if heads else None,
+        refine=REFINE_WEIGHTS.read(refining[0])[0] if refining else None,
+        head=HEAD_WEIGHTS.read(heads[0])[0] if heads else None,
     )
 
 

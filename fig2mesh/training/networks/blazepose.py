@@ -16,7 +16,7 @@ from torch import nn
 
 from fig2mesh.errors import InputError
 from fig2mesh.nets.figure_parser import Encoder, FigureParser, Side, Widened
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 
 REMEDY = "give pose_landmark_full.tflite of the package @mediapipe/pose 0.5"
 

@@ -11,27 +11,21 @@ threads give the same weights, and an interrupted run that is resumed gives thos
 
 from __future__ import annotations
 
-import csv
-import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import torch
 from torch import Tensor, nn
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
-from fig2mesh.errors import InputError
-
-CHECKPOINT = "checkpoint.pt"
-LOG = "log.csv"
-CURVE = "curve.png"
-SCORES = "scores.json"
+from fig2mesh.training.networks.checkpoint import Argument, State, resume, save_checkpoint
+from fig2mesh.training.networks.run_log import CURVE, LOG, draw_curve, write_log
+from fig2mesh.training.networks.schedule import Schedule
 
 ROWS_A_VALIDATION = 10
 """Rows of the log from one validation to the next."""
@@ -42,7 +36,6 @@ DRAW_S = 60.0
 LAST_RATE = 0.01
 """Share of the learning rate that the cosine ends at."""
 
-Argument = str | int | float | bool | None
 Step = Callable[[nn.Module, torch.Generator, float], Mapping[str, Tensor]]
 """(model, generator, progress in [0, 1]) → scalar tensors; "loss" is what is minimised, the others are logged."""
 
@@ -67,20 +60,6 @@ class Result:
     metrics: dict[str, float]
 
 
-@dataclass
-class _State:
-    """What changes from step to step, besides the model and the optimizer."""
-
-    generator: torch.Generator
-    averaged: dict[str, Tensor]
-    step: int = 0
-    seconds: float = 0.0
-    progress: float = 0.0
-    rows: list[dict[str, float]] = field(default_factory=list)
-    sums: dict[str, Tensor] = field(default_factory=dict)
-    summed: int = 0
-
-
 def seeded(seed: int, make: Callable[[], M]) -> M:
     """`make()` with the global generators seeded, and left as they were: for building a model."""
     with torch.random.fork_rng():
@@ -88,58 +67,75 @@ def seeded(seed: int, make: Callable[[], M]) -> M:
         return make()
 
 
-def run_loop(
-    *,
-    model: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    step: Step,
-    folder: Path,
-    validate: Validate | None = None,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = 1,
-    warmup: int = 100,
-    ema: float = 0.999,
-    clip: float | None = None,
-    device: torch.device | str = "cpu",
-    amp: bool | None = None,
-    validations: int = 20,
-    arguments: Mapping[str, Argument] | None = None,
-    checkpoint_s: float = 60.0,
-    clock: Callable[[], float] = time.perf_counter,
-) -> Result:
-    """Train `model` until its time or its steps are used up, going on from the checkpoint in `folder` if there is one.
+@dataclass(frozen=True)
+class Task:
+    """A network and how it learns.
 
-    budget_min : minutes, those before an interruption included; steps : their number; whichever ends first
+    model, optimizer : on the device of the schedule
+    step : loss of one batch
+    validate : scores for the log; None for none
     batch : samples a step, for the log
-    warmup : steps over which the learning rate rises; then it falls as a cosine of the progress
-    ema : decay of the averaged weights, less at first; 0 for none
-    clip : largest norm of the gradients
-    device : where the model is; amp : compute in bfloat16 where that is safe (the default on CUDA)
-    validations : how often, over the whole run; the last comes at its end
     arguments : whatever else decides the result; a checkpoint with others is refused
     """
-    if budget_min is None and steps is None:
+
+    model: nn.Module
+    optimizer: torch.optim.Optimizer
+    step: Step
+    validate: Validate | None = None
+    batch: int = 1
+    arguments: Mapping[str, Argument] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Regime:
+    """What is the same for all runs of a network.
+
+    warmup : steps over which the learning rate rises; then it falls as a cosine of the progress
+    ema : decay of the averaged weights, less at first; 0 for none
+    clip : largest norm of the gradients; None for any
+    amp : compute in bfloat16 where that is safe; None to do so on CUDA alone
+    validations : their number over the whole run; the last comes at its end
+    checkpoint_s : seconds from one checkpoint to the next
+    """
+
+    warmup: int = 100
+    ema: float = 0.999
+    clip: float | None = None
+    amp: bool | None = None
+    validations: int = 20
+    checkpoint_s: float = 60.0
+
+
+def run_loop(
+    task: Task,
+    folder: Path,
+    schedule: Schedule,
+    regime: Regime = Regime(),
+    *,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Result:
+    """Train a network until its time or steps are used up, going on from the checkpoint in `folder` if there is one."""
+    if schedule.budget_min is None and schedule.steps is None:
         raise ValueError("neither budget_min nor steps given")
-    device = torch.device(device)
-    mixed = device.type == "cuda" if amp is None else amp
+    model, optimizer = task.model, task.optimizer
+    device = torch.device(schedule.device)
+    mixed = device.type == "cuda" if regime.amp is None else regime.amp
     rates = [float(group.setdefault("initial_lr", group["lr"])) for group in optimizer.param_groups]
     identity: dict[str, Argument] = {
-        "seed": seed,
-        "steps": steps,
-        "budget_min": budget_min,
-        "batch": batch,
-        "warmup": warmup,
-        "ema": ema,
-        "clip": clip,
+        "seed": schedule.seed,
+        "steps": schedule.steps,
+        "budget_min": schedule.budget_min,
+        "batch": task.batch,
+        "warmup": regime.warmup,
+        "ema": regime.ema,
+        "clip": regime.clip,
         "amp": mixed,
         "learning_rate": rates[0],
-        **(arguments or {}),
+        **task.arguments,
     }
     folder.mkdir(parents=True, exist_ok=True)
-    state = _State(torch.Generator().manual_seed(seed), _copy(model))
-    _resume(folder, identity, model, optimizer, state)
+    state = State(torch.Generator().manual_seed(schedule.seed), _copy(model))
+    resume(folder, identity, model, optimizer, state)
 
     before, start = state.seconds, clock()
     saved = drawn = before
@@ -147,18 +143,19 @@ def run_loop(
     with torch.random.fork_rng(devices=devices):
         while state.progress < 1:
             torch.manual_seed(int(torch.randint(2**62, (), generator=state.generator)))
-            rate = _rate(state.step, state.progress, warmup)
+            rate = _rate(state.step, state.progress, regime.warmup)
             for group, initial in zip(optimizer.param_groups, rates, strict=True):
                 group["lr"] = initial * rate
             model.train()
             with torch.autocast(device.type, torch.bfloat16, enabled=mixed):
-                losses = step(model, state.generator, state.progress)
+                losses = task.step(model, state.generator, state.progress)
             optimizer.zero_grad(set_to_none=True)
             losses["loss"].backward()  # type: ignore[no-untyped-call]
-            if clip is not None:
-                nn.utils.clip_grad_norm_(model.parameters(), clip)
+            if regime.clip is not None:
+                nn.utils.clip_grad_norm_(model.parameters(), regime.clip)
             optimizer.step()
-            _average(state.averaged, model, min(ema, (1 + state.step) / (10 + state.step)) if ema else 0.0)
+            decay = min(regime.ema, (1 + state.step) / (10 + state.step)) if regime.ema else 0.0
+            _average(state.averaged, model, decay)
             state.step += 1
             state.summed += 1
             for name, value in losses.items():
@@ -167,25 +164,26 @@ def run_loop(
 
             last = state.progress
             state.seconds = before + clock() - start
-            state.progress = _progress(state, budget_min, steps)
-            ticks = validations * ROWS_A_VALIDATION
+            state.progress = _progress(state, schedule.budget_min, schedule.steps)
+            ticks = regime.validations * ROWS_A_VALIDATION
             if int(state.progress * ticks) > int(last * ticks):
-                wanted = int(state.progress * validations) > int(last * validations)
-                _log_row(state, batch, rates[0] * rate, _scores(model, state, validate) if wanted else {})
+                wanted = int(state.progress * regime.validations) > int(last * regime.validations)
+                scores = _scores(model, state, task.validate) if wanted else {}
+                _log_row(state, task.batch, rates[0] * rate, scores)
                 write_log(folder / LOG, state.rows)
                 if state.progress >= 1 or state.seconds - drawn >= DRAW_S:
                     draw_curve(folder / CURVE, state.rows)
                     drawn = state.seconds
                 state.seconds = before + clock() - start
-            if state.seconds - saved >= checkpoint_s or state.progress >= 1:
-                _save(folder, identity, model, optimizer, state)
+            if state.seconds - saved >= regime.checkpoint_s or state.progress >= 1:
+                save_checkpoint(folder, identity, model, optimizer, state)
                 saved = state.seconds
     model.load_state_dict(state.averaged)
     model.eval()
-    return Result(state.step, state.step * batch, state.seconds, dict(state.rows[-1]) if state.rows else {})
+    return Result(state.step, state.step * task.batch, state.seconds, dict(state.rows[-1]) if state.rows else {})
 
 
-def _progress(state: _State, budget_min: float | None, steps: int | None) -> float:
+def _progress(state: State, budget_min: float | None, steps: int | None) -> float:
     shares = [0.0]
     if budget_min is not None:
         shares.append(state.seconds / max(60 * budget_min, 1e-9))
@@ -230,120 +228,15 @@ def averaged_weights(model: nn.Module, averaged: Mapping[str, Tensor]) -> Iterat
         model.load_state_dict(own)
 
 
-def _scores(model: nn.Module, state: _State, validate: Validate | None) -> dict[str, float]:
+def _scores(model: nn.Module, state: State, validate: Validate | None) -> dict[str, float]:
     if validate is None:
         return {}
     with averaged_weights(model, state.averaged):
         return {f"valid_{name}": float(value) for name, value in validate().items()}
 
 
-def _log_row(state: _State, batch: int, rate: float, scores: Mapping[str, float]) -> None:
+def _log_row(state: State, batch: int, rate: float, scores: Mapping[str, float]) -> None:
     means = {name: float(value) / state.summed for name, value in state.sums.items()}
     head = {"step": float(state.step), "seconds": state.seconds, "samples": float(state.step * batch), "rate": rate}
     state.rows.append({**head, **means, **scores})
     state.sums, state.summed = {}, 0
-
-
-def write_log(path: Path, rows: list[dict[str, float]]) -> None:
-    """Write the rows as CSV, one column a name; replaced as a whole, so that no row of a lost step remains."""
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    part = path.with_name(path.name + ".part")
-    with part.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows([f"{row[name]:.6g}" if name in row else "" for name in columns] for row in rows)
-    os.replace(part, path)
-
-
-def write_scores(folder: Path, scores: Mapping[str, float]) -> None:
-    """Write the scores of a finished run, whole or not at all."""
-    part = folder / (SCORES + ".part")
-    part.write_text(json.dumps(dict(scores), indent=1) + "\n", encoding="utf-8")
-    os.replace(part, folder / SCORES)
-
-
-def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
-    """Losses and scores over the steps; nothing is drawn where matplotlib is not installed."""
-    try:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        from matplotlib.figure import Figure
-    except ImportError:
-        return
-    every = dict.fromkeys(name for row in rows for name in row)
-    names = [name for name in every if name not in ("step", "seconds", "samples", "rate")]
-    pairs = {
-        name.removeprefix("valid_"): [n for n in names if n.removeprefix("valid_") == name.removeprefix("valid_")]
-        for name in names
-    }
-    figure = Figure(figsize=(5, 2.2 * len(pairs)), layout="constrained")
-    for index, (title, shown) in enumerate(pairs.items()):
-        axes = figure.add_subplot(len(pairs), 1, index + 1)
-        for name in shown:
-            points = [(row["step"], row[name]) for row in rows if name in row]
-            axes.plot(*zip(*points, strict=True), label=name, marker="." if name.startswith("valid_") else "")
-        if all(row[name] > 0 for name in shown for row in rows if name in row):
-            axes.set_yscale("log")
-        axes.set_title(title, fontsize="small")
-        axes.legend(fontsize="x-small")
-    figure.savefig(path, dpi=80)
-
-
-def _save(
-    folder: Path,
-    identity: dict[str, Argument],
-    model: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    state: _State,
-) -> None:
-    content: dict[str, Any] = {
-        "arguments": identity,
-        "model": model.state_dict(),
-        "averaged": state.averaged,
-        "optimizer": optimizer.state_dict(),
-        "generator": state.generator.get_state(),
-        "step": state.step,
-        "seconds": state.seconds,
-        "progress": state.progress,
-        "rows": state.rows,
-        "sums": state.sums,
-        "summed": state.summed,
-    }
-    part = folder / (CHECKPOINT + ".part")
-    torch.save(content, part)
-    os.replace(part, folder / CHECKPOINT)
-
-
-def _resume(
-    folder: Path,
-    identity: dict[str, Argument],
-    model: nn.Module,
-    optimizer: torch.optim.Optimizer,
-    state: _State,
-) -> None:
-    """Put the model, the optimizer and the state where the checkpoint in `folder` left them, if there is one."""
-    path = folder / CHECKPOINT
-    if not path.exists():
-        return
-    another = "give the same arguments to go on, or another folder to start again"
-    device = next(model.parameters()).device
-    try:
-        found: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
-        stored: dict[str, Argument] = found["arguments"]
-    except Exception as error:
-        raise InputError(str(path), f"no readable checkpoint ({type(error).__name__})", "delete it") from None
-    differing = [name for name in {**stored, **identity} if stored.get(name) != identity.get(name)]
-    if differing:
-        listed = ", ".join(f"{name} {stored.get(name)} there and {identity.get(name)} here" for name in differing)
-        raise InputError(str(folder), f"its checkpoint was made with other arguments: {listed}", another)
-    try:
-        model.load_state_dict(found["model"])
-    except RuntimeError:
-        raise InputError(str(folder), "its checkpoint is of another network", another) from None
-    optimizer.load_state_dict(found["optimizer"])
-    state.averaged = {name: value.to(device) for name, value in found["averaged"].items()}
-    state.generator.set_state(found["generator"])
-    state.sums = {name: value.to(device) for name, value in found["sums"].items()}
-    state.step, state.summed, state.rows = int(found["step"]), int(found["summed"]), found["rows"]
-    state.seconds, state.progress = float(found["seconds"]), float(found["progress"])

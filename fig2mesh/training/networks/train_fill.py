@@ -8,17 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, fill_path, sample, save_fill
-from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, sample
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT
+from fig2mesh.training.samples.texels import Texels, gather
 from fig2mesh.training.samples.texture_data import load_drawings
 from fig2mesh.training.samples.unfold import Unfolded, unfold
 
@@ -35,38 +38,20 @@ SMOOTH: Final = 0.02
 OUTSIDE: Final = 0.1
 
 
-class Texels(NamedTuple):
-    """A batch: inputs (N, 8, S, S), place (N, 2, S, S), truth (N, 3, S, S) 0-1, weight (N, S, S), seen (N, S, S),
-    front (N, 3, H, W) 0-1, inside (N, 1, H, W)."""
-
-    inputs: Tensor
-    place: Tensor
-    truth: Tensor
-    weight: Tensor
-    seen: Tensor
-    front: Tensor
-    inside: Tensor
-
-
 def train_fill(
     data: Path,
     out: Path,
-    *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
-    rate: float = RATE,
-    device: str = "cpu",
-    amp: bool = True,
+    schedule: Schedule,
 ) -> dict[str, float]:
     """Scores on the held-out splits; writes all that training leaves.
 
-    amp : compute in bfloat16, which processors that have it do three times as fast
+    Computes in bfloat16, which processors that have it do three times as fast.
     """
+    batch, rate = schedule.usual(BATCH, RATE)
+    device = schedule.device
     known = unfold(load_drawings(data, ("train",), pictures=True))
     held = {split: unfold(load_drawings(data, (split,), pictures=True, most=24)) for split in HELD_OUT}
-    net = seeded(seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
+    net = seeded(schedule.seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         rows = torch.randint(len(known), (batch,), generator=generator).numpy()
@@ -77,21 +62,17 @@ def train_fill(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=100,
-        clip=1.0,
-        device=device,
-        amp=amp,
-        validations=6,
-        arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={"size": net.shape.size, "filters": net.shape.filters, "data": recipe_digest(data)},
+        ),
+        out,
+        schedule,
+        Regime(warmup=100, clip=1.0, amp=True, validations=6),
     )
     found = {
         f"{split}_{name}": value
@@ -102,25 +83,13 @@ def train_fill(
     facts = {
         "data": recipe_digest(data),
         "bodies": len(known),
-        "seed": seed,
+        "seed": schedule.seed,
         "steps": result.steps,
         "samples": result.samples,
         "scores": found,
     }
-    save_fill(fill_path(out), net, facts)
+    FILL_WEIGHTS.save(FILL_WEIGHTS.path(net.shape, out), net, facts)
     return found
-
-
-def gather(bodies: Unfolded, rows: np.ndarray) -> Texels:
-    """Some bodies as tensors."""
-    place = torch.from_numpy(bodies.place[rows].astype(np.float32)).movedim(3, 1)
-    front = torch.from_numpy(bodies.front[rows].astype(np.float32) / 255).movedim(3, 1)
-    there, seen, same = (torch.from_numpy(array[rows]) for array in (bodies.there, bodies.seen, bodies.same))
-    truth = torch.from_numpy(bodies.truth[rows].astype(np.float32) / 255).movedim(3, 1)
-    weight = torch.from_numpy(bodies.weight[rows].astype(np.float32))
-    inside = torch.from_numpy(bodies.inside[rows].astype(np.float32))[:, None]
-    inputs = fill_inputs(place, there, seen, same, sample(front, place))
-    return Texels(inputs, place, truth, weight, seen, front, inside)
 
 
 def losses(model: torch.nn.Module, texels: Texels) -> dict[str, Tensor]:

@@ -22,15 +22,15 @@ from fig2mesh.nets.figure_parser import (
     JOINTS,
     LABELS,
     MASK,
+    PARSER_WEIGHTS,
     Depthwise,
     FigureParser,
     Parsed,
-    parser_path,
-    read_parser,
-    save_parser,
 )
-from fig2mesh.records import JOINT
-from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.skeleton import JOINT
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.crop_data import KINDS, crops_digest, joined, load_crops
 from fig2mesh.training.samples.crop_views import Viewer
 
@@ -56,31 +56,28 @@ VIEWS = 64
 def train_parse(
     data: Path,
     out: Path,
+    schedule: Schedule,
     *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    init: Path | None = None,
     blazepose: Path | None = None,
-    rate: float = RATE,
-    batch: int = BATCH,
     whole: bool = False,
 ) -> dict[str, float]:
     """Train on the crops of `data`; weights, log and scores go to `out`.
 
-    init : folder of an earlier run whose weights are the start; blazepose : TFLite file for the encoder's start
+    blazepose : TFLite file for the encoder's start
     whole : train the encoder's first stages and its filters too, which take half of the time and know edges already
     """
     import cv2
 
     cv2.setNumThreads(1)
+    batch, rate = schedule.usual(BATCH, RATE)
+    seed, init = schedule.seed, schedule.init
     net = seeded(seed, FigureParser)
     if blazepose is not None:
         from fig2mesh.training.networks.blazepose import start_from
 
         start_from(net, blazepose)
     if init is not None:
-        net.load_state_dict(read_parser(parser_path(init))[0].state_dict())
+        net.load_state_dict(PARSER_WEIGHTS.read(PARSER_WEIGHTS.path(net.shape, init))[0].state_dict())
         net.requires_grad_(True)
     if not whole:
         for early in (
@@ -129,25 +126,21 @@ def train_parse(
         "start": None if blazepose is None else "BlazePose full (Apache-2.0)",
     }
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        folder=out,
-        validate=validate,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=60,
-        ema=0.998,
-        clip=1.0,
-        amp=True,
-        validations=12,
-        arguments={"data": facts["data"], "init": None if init is None else init.name, "whole": whole},
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={"data": facts["data"], "init": None if init is None else init.name, "whole": whole},
+        ),
+        out,
+        schedule,
+        Regime(warmup=60, ema=0.998, clip=1.0, amp=True, validations=12),
     )
     scores = dict(validate())
-    save_parser(
-        parser_path(out),
+    PARSER_WEIGHTS.save(
+        PARSER_WEIGHTS.path(net.shape, out),
         net,
         {
             **facts,

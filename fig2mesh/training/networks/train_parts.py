@@ -10,6 +10,7 @@ points 95 (single precision 34, by concatenation 20), one-stream with pose point
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,10 +19,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from fig2mesh.nets import weights
 from fig2mesh.nets.decode import decode, decode_dense
-from fig2mesh.nets.disn import Disn, DisnShape, as_input
-from fig2mesh.training.networks.loop import run_loop, seeded
+from fig2mesh.nets.disn import PART_WEIGHTS, Disn, DisnShape, as_input
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import MIRROR, VIEWS, PartData, load_parts, swapped, turned, turned_grid
 
@@ -30,52 +31,65 @@ MASK_MIX: Final = (0.45, 0.45, 0.10)
 CHECKED: Final = 64
 """Parts whose sampled points are scored during training."""
 
+BATCH: Final = 16
+RATE: Final = 2e-3
+
+
+@dataclass(frozen=True)
+class PartSampling:
+    """What of the data a part network learns from and is scored on.
+
+    points : points of each sample
+    mask_mix : shares of whole, visible and empty masks
+    jitter : most standard deviation of the joints, PART units; each sample draws its own up to this
+    max_bodies : bodies of the training split that are used; None for all
+    validation_bodies : held-out bodies for the final scores
+    """
+
+    points: int = 384
+    mask_mix: tuple[float, float, float] = MASK_MIX
+    jitter: float = 0.0
+    max_bodies: int | None = None
+    validation_bodies: int = 6
+
 
 def train_parts(
     data: Path,
     kind: str,
     shape: DisnShape,
     out: Path,
+    schedule: Schedule = Schedule(),  # noqa: B008 - frozen
+    sampling: PartSampling = PartSampling(),
     *,
-    budget_min: float | None = None,
     epochs: int | None = None,
-    batch: int = 16,
-    points: int = 384,
-    lr: float = 2e-3,
-    seed: int = 0,
-    device: str = "cpu",
-    mask_mix: tuple[float, float, float] = MASK_MIX,
-    max_bodies: int | None = None,
-    jitter: float = 0.0,
-    validation_bodies: int = 6,
     ema: float = 0.999,
-    init: Path | None = None,
 ) -> dict[str, float]:
     """Train one network on the shards in `data`, going on where an earlier call stopped; returns its scores.
 
-    Writes log.csv, curve.png, checkpoint.pt and at last the weights, `weights.disn_path(shape, out)`.
-    budget_min : minutes; epochs : times that each part is seen in each view; whichever ends first
-    lr : learning rate, which falls to a hundredth as a cosine
-    mask_mix : shares of whole, visible and empty masks
-    jitter : most standard deviation of the joints, PART units; each sample draws its own up to this
-    init : folder with the weights of an earlier run, from which this one starts instead of at random
-    validation_bodies : held-out bodies for the final scores
+    Writes log.csv, curve.png, checkpoint.pt and at last the weights, `PART_WEIGHTS.path(shape, out)`. The learning rate
+    falls to a hundredth as a cosine.
+    epochs : times that each part is seen in each view, in place of the steps of the schedule
+    ema : decay of the averaged weights
     """
     if kind != shape.kind:
         raise ValueError(f"kind: {kind}, but the network is for {shape.kind}")
-    train = load_parts(data, kind, "train", max_bodies=max_bodies)
+    batch, rate = schedule.usual(BATCH, RATE)
+    points = sampling.points
+    train = load_parts(data, kind, "train", max_bodies=sampling.max_bodies)
     held_out = bool(list(data.glob("valid*.npz")))
     checked = load_parts(data, kind, "valid", max_bodies=CHECKED) if held_out else None
-    net = seeded(seed, lambda: Disn(shape)).to(device)
+    net = seeded(schedule.seed, lambda: Disn(shape)).to(schedule.device)
     before: dict[str, Any] = {}
-    if init is not None:
-        earlier, before = weights.read_disn(weights.disn_path(shape, init))
+    if schedule.init is not None:
+        earlier, before = PART_WEIGHTS.read(PART_WEIGHTS.path(shape, schedule.init))
         net.load_state_dict(earlier.state_dict())
-    optimizer = torch.optim.Adam(net.parameters(), lr=lr, fused=True)
+    optimizer = torch.optim.Adam(net.parameters(), lr=rate, fused=True)
 
     def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         chance = np.random.default_rng(int(torch.randint(2**62, (), generator=generator)))
-        mask, anchors, places, target = draw(train, chance, batch, points, mask_mix, jitter, device)
+        mask, anchors, places, target = draw(
+            train, chance, batch, points, sampling.mask_mix, sampling.jitter, schedule.device
+        )
         predicted = model(mask, anchors, places)
         error = (predicted - target).abs()
         near = target.abs() < 2 / 63
@@ -85,45 +99,43 @@ def train_parts(
     def validate() -> dict[str, float]:
         return sampled_scores(net, checked, points) if checked is not None else {}
 
-    steps = None if epochs is None else -(-epochs * VIEWS * len(train) // batch)
+    if epochs is not None:
+        schedule = replace(schedule, steps=-(-epochs * VIEWS * len(train) // batch))
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        folder=out,
-        validate=validate,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        ema=ema,
-        clip=1.0,
-        device=device,
-        amp=True,
-        arguments={
-            "kind": kind,
-            "variant": shape.variant,
-            "points": points,
-            "parts": len(train),
-            "data": recipe_digest(data),
-            "jitter": jitter,
-            "mask_mix": " ".join(map(str, mask_mix)),
-            "init_samples": before.get("samples", 0),
-        },
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={
+                "kind": kind,
+                "variant": shape.variant,
+                "points": points,
+                "parts": len(train),
+                "data": recipe_digest(data),
+                "jitter": sampling.jitter,
+                "mask_mix": " ".join(map(str, sampling.mask_mix)),
+                "init_samples": before.get("samples", 0),
+            },
+        ),
+        out,
+        schedule,
+        Regime(ema=ema, clip=1.0, amp=True),
     )
     scores: dict[str, float] = {}
     if held_out:
         for which in ("visible", "amodal"):
-            found = evaluate_parts(net, data, "valid", which, validation_bodies, one_view=True, dense=False)
+            found = evaluate_parts(net, data, "valid", which, sampling.validation_bodies, one_view=True, dense=False)
             scores |= {f"{name}_{which}": value for name, value in found.items()}
     facts = {
         "data": {"parts": len(train), "name": data.name},
-        "seed": seed,
+        "seed": schedule.seed,
         "steps": result.steps,
         "samples": before.get("samples", 0) + result.samples,
         "scores": scores,
     }
-    weights.save_disn(weights.disn_path(shape, out), net, facts)
+    PART_WEIGHTS.save(PART_WEIGHTS.path(shape, out), net, facts)
     return {**result.metrics, **scores}
 
 

@@ -18,10 +18,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, bone_lengths, lift, pose_path, save_pose
-from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLift, PoseLiftShape, bone_lengths, lift
+from fig2mesh.skeleton import JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, View
-from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
+from fig2mesh.training.networks.schedule import Schedule
 
 if TYPE_CHECKING:
     from fig2mesh.training.bodies.pack import Pack
@@ -42,27 +44,22 @@ def train_pose(
     train: Skeletons,
     valid: Skeletons,
     out: Path,
+    schedule: Schedule,
     *,
     shape: PoseLiftShape = PoseLiftShape(),  # noqa: B008 - frozen
     augment: bool = True,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
-    rate: float = RATE,
-    device: str = "cpu",
     dropout: float = 0.1,
-    amp: bool = True,
 ) -> tuple[PoseLift, dict[str, float]]:
     """The trained network and its scores on held-out poses and bodies; writes all that training leaves.
 
     dropout : of all hidden layers; Martinez et al. take a half
     augment : train on drawings' proportions, views and errors, and not on the plain protocol of the paper
     """
+    batch, rate = schedule.usual(BATCH, RATE)
     view = replace(DRAWN if augment else AROUND, perspective=shape.perspective)
-    sampler = Sampler(train, device)
-    net = seeded(seed, lambda: PoseLift(shape, dropout)).to(device)
-    measured = sampler.draw(4096, AROUND, torch.Generator().manual_seed(seed)).joints
+    sampler = Sampler(train, schedule.device)
+    net = seeded(schedule.seed, lambda: PoseLift(shape, dropout)).to(schedule.device)
+    measured = sampler.draw(4096, AROUND, torch.Generator().manual_seed(schedule.seed)).joints
     net.bone_length.copy_(bone_lengths(measured))
     if shape.limbs:
         net.limb_length.copy_(bone_lengths(measured, shape.bones))
@@ -75,7 +72,7 @@ def train_pose(
         part = slice(0, 3) if shape.perspective else slice(2, 3)
         return {"loss": (found[..., part] - target[..., part]).square().sum(dim=2).mean()}
 
-    held = Sampler(valid, device)
+    held = Sampler(valid, schedule.device)
     quick = _held(held, view, shape, 1024)
 
     def validate() -> Mapping[str, float]:
@@ -83,31 +80,27 @@ def train_pose(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=200,
-        clip=1.0,
-        device=device,
-        amp=amp,
-        validations=10,
-        arguments={
-            "joints": shape.joints,
-            "perspective": shape.perspective,
-            "visibility": shape.visibility,
-            "metric": shape.metric,
-            "width": shape.width,
-            "augment": augment,
-            "limbs": shape.limbs,
-            "dropout": dropout,
-            "data": hashlib.sha256(train.rotations.tobytes() + train.reach.tobytes()).hexdigest()[:16],
-        },
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={
+                "joints": shape.joints,
+                "perspective": shape.perspective,
+                "visibility": shape.visibility,
+                "metric": shape.metric,
+                "width": shape.width,
+                "augment": augment,
+                "limbs": shape.limbs,
+                "dropout": dropout,
+                "data": hashlib.sha256(train.rotations.tobytes() + train.reach.tobytes()).hexdigest()[:16],
+            },
+        ),
+        out,
+        schedule,
+        Regime(warmup=200, clip=1.0, amp=True, validations=10),
     )
     scores = {
         f"{name}_{score}": value
@@ -116,8 +109,8 @@ def train_pose(
     }
     write_scores(out, scores)
     data = {"poses": len(train.rotations), "bodies": len(train.reach), "augment": augment}
-    facts = {"data": data, "seed": seed, "steps": result.steps, "samples": result.samples, "scores": scores}
-    save_pose(pose_path(shape, out), net, facts)
+    facts = {"data": data, "seed": schedule.seed, "steps": result.steps, "samples": result.samples, "scores": scores}
+    POSE_WEIGHTS.save(POSE_WEIGHTS.path(shape, out), net, facts)
     return net, scores
 
 

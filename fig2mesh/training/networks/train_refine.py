@@ -15,20 +15,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from fig2mesh.nets.head_hsv import (
-    HeadHsv,
-    HeadShape,
-    disc_value,
-    head_inputs,
-    head_path,
-    head_window,
-    rgb_of,
-    save_head,
-)
-from fig2mesh.nets.texture_fill import fill_path, read_fill
-from fig2mesh.nets.view_refine import RefineShape, ViewRefine, refine, refine_inputs, refine_path, save_refine
-from fig2mesh.records import PART
-from fig2mesh.training.networks.loop import Result, run_loop, seeded, write_scores
+from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadHsv, HeadShape, disc_value, head_inputs, head_window, rgb_of
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
+from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape, ViewRefine, refine, refine_inputs
+from fig2mesh.skeleton import PART
+from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.painted import Painter, Sides, painters
 from fig2mesh.training.samples.part_data import HELD_OUT
@@ -45,19 +38,17 @@ def train_refine(
     data: Path,
     fill: Path,
     out: Path,
+    schedule: Schedule,
     *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
     filters: int = RefineShape.filters,
 ) -> Scores:
     """Scores on the held-out splits; writes all that training leaves.
 
     fill : folder with the weights of the network that paints the sides
     """
+    batch, _ = schedule.usual(BATCH, RATE)
     known, held = _painters(data, fill)
-    net = seeded(seed, lambda: ViewRefine(RefineShape(filters)))
+    net = seeded(schedule.seed, lambda: ViewRefine(RefineShape(filters)))
 
     def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         sides = _draw(known, batch, generator)
@@ -65,13 +56,14 @@ def train_refine(
         found = sides.painted + model(inputs)
         return {"loss": picture_loss(found, sides.truth, sides.known)}
 
-    result = _run(net, step, lambda: refine_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
+    result = _run(net, step, lambda: refine_scores(net, held["valid-clips"]), data, out, schedule, batch)
     found = {
         f"{split}_{name}": value
         for split, painter in held.items()
         for name, value in refine_scores(net, painter).items()
     }
-    save_refine(refine_path(out), net, _facts(data, len(known), seed, result, found, out))
+    facts = _facts(data, len(known), schedule.seed, result, found, out)
+    REFINE_WEIGHTS.save(REFINE_WEIGHTS.path(net.shape, out), net, facts)
     return found
 
 
@@ -79,16 +71,14 @@ def train_head(
     data: Path,
     fill: Path,
     out: Path,
+    schedule: Schedule,
     *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = HEADS,
     shape: HeadShape = HeadShape(),  # noqa: B008 - frozen
 ) -> Scores:
     """Scores on the held-out splits; writes all that training leaves."""
+    batch, _ = schedule.usual(HEADS, RATE)
     known, held = _painters(data, fill)
-    net = seeded(seed, lambda: HeadHsv(shape))
+    net = seeded(schedule.seed, lambda: HeadHsv(shape))
 
     def step(model: nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
         crops = _heads(_draw(known, batch, generator))
@@ -100,11 +90,12 @@ def train_head(
         inputs = torch.cat([(painted + noise) * there[:, None], inputs[:, 3:]], dim=1)
         return head_losses(model(inputs), truth, there)
 
-    result = _run(net, step, lambda: head_scores(net, held["valid-clips"]), data, out, budget_min, steps, seed, batch)
+    result = _run(net, step, lambda: head_scores(net, held["valid-clips"]), data, out, schedule, batch)
     found = {
         f"{split}_{name}": value for split, painter in held.items() for name, value in head_scores(net, painter).items()
     }
-    save_head(head_path(out), net, _facts(data, len(known), seed, result, found, out))
+    facts = _facts(data, len(known), schedule.seed, result, found, out)
+    HEAD_WEIGHTS.save(HEAD_WEIGHTS.path(net.shape, out), net, facts)
     return found
 
 
@@ -155,7 +146,7 @@ def head_scores(net: HeadHsv, painter: Painter) -> Scores:
 
 
 def _painters(data: Path, fill: Path) -> tuple[Painter, dict[str, Painter]]:
-    net, _ = read_fill(fill_path(fill))
+    net, _ = FILL_WEIGHTS.read(FILL_WEIGHTS.path(FillShape(), fill))
     known = painters(data, net, ("train",))
     return known, {split: painters(data, net, (split,), 16) for split in HELD_OUT}
 
@@ -192,27 +183,23 @@ def _run(
     validate: Callable[[], Scores],
     data: Path,
     out: Path,
-    budget_min: float | None,
-    steps: int | None,
-    seed: int,
+    schedule: Schedule,
     batch: int,
 ) -> Result:
-    optimizer = torch.optim.AdamW(net.parameters(), RATE, weight_decay=1e-4)
+    _, rate = schedule.usual(batch, RATE)
+    optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     return run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=100,
-        clip=1.0,
-        amp=True,
-        validations=5,
-        arguments={"data": recipe_digest(data)},
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={"data": recipe_digest(data)},
+        ),
+        out,
+        schedule,
+        Regime(warmup=100, clip=1.0, amp=True, validations=5),
     )
 
 

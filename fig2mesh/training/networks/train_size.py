@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.nets.part_size import OUTPUTS, PartSizeNet, SizeShape, bone_unit, save_size, size_path
+from fig2mesh.nets.part_size import OUTPUTS, SIZE_WEIGHTS, PartSizeNet, SizeShape, bone_unit
 from fig2mesh.records import _Checked
 from fig2mesh.skeleton import MIRRORED, PART_KIND, anchor_joints
-from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import read_shard, recipe_digest, shards
 
 BATCH: Final = 512
@@ -113,18 +115,14 @@ def train_size(
     data: Path,
     kind: str,
     out: Path,
-    *,
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
-    rate: float = RATE,
-    device: str = "cpu",
+    schedule: Schedule,
 ) -> tuple[PartSizeNet, dict[str, float]]:
     """The trained network of a kind and its scores on the held-out splits; writes all that training leaves."""
+    batch, rate = schedule.usual(BATCH, RATE)
+    device = schedule.device
     known = Columns.of(read_sizes(data, "train", kind), device)
     held = {split: Columns.of(read_sizes(data, split, kind), device) for split in ("valid-clips", "valid-characters")}
-    net = seeded(seed, lambda: PartSizeNet(SizeShape(kind))).to(device)
+    net = seeded(schedule.seed, lambda: PartSizeNet(SizeShape(kind))).to(device)
     # The middle of the data, so that training starts at sizes and not at bones.
     offset = (known.size / bone_unit(known.anchors)[:, None]).log().median(dim=0).values
     with torch.no_grad():
@@ -144,19 +142,17 @@ def train_size(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        clip=1.0,
-        device=device,
-        amp=False,
-        arguments={"kind": kind, "data": recipe_digest(data), "parts": len(known.size)},
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={"kind": kind, "data": recipe_digest(data), "parts": len(known.size)},
+        ),
+        out,
+        schedule,
+        Regime(clip=1.0, amp=False),
     )
     scores = {
         f"{split}_{name}": value for split, columns in held.items() for name, value in size_scores(net, columns).items()
@@ -164,12 +160,12 @@ def train_size(
     write_scores(out, scores)
     facts = {
         "data": {"parts": len(known.size), "name": data.name},
-        "seed": seed,
+        "seed": schedule.seed,
         "steps": result.steps,
         "samples": result.samples,
         "scores": scores,
     }
-    save_size(size_path(kind, out), net, facts)
+    SIZE_WEIGHTS.save(SIZE_WEIGHTS.path(net.shape, out), net, facts)
     return net, scores
 
 

@@ -15,9 +15,11 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape, read_uv, save_uv, uv_inputs, uv_path
-from fig2mesh.records import PART
-from fig2mesh.training.networks.loop import run_loop, seeded, write_scores
+from fig2mesh.nets.uv_unet import UV_WEIGHTS, UvUnet, UvUnetShape, uv_inputs
+from fig2mesh.skeleton import PART
+from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.run_log import write_scores
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import HELD_OUT
 from fig2mesh.training.samples.texture_data import Drawings, load_drawings
@@ -40,28 +42,21 @@ Batch = tuple[Tensor, Tensor, Tensor, Tensor]
 def train_uv(
     data: Path,
     out: Path,
-    *,
+    schedule: Schedule,
     shape: UvUnetShape = UvUnetShape(),  # noqa: B008 - frozen
-    budget_min: float | None = None,
-    steps: int | None = None,
-    seed: int = 0,
-    batch: int = BATCH,
-    rate: float = RATE,
-    device: str = "cpu",
-    amp: bool = True,
-    init: Path | None = None,
 ) -> dict[str, float]:
     """Scores on the held-out splits; writes all that training leaves.
 
-    init : folder of an earlier run whose weights training starts from
-    amp : compute in bfloat16, which processors that have it do three times as fast
+    Computes in bfloat16, which processors that have it do three times as fast.
     """
+    batch, rate = schedule.usual(BATCH, RATE)
+    device = schedule.device
     known = load_drawings(data, ("train",), pictures=False)
     held = {split: load_drawings(data, (split,), pictures=False, most=24) for split in HELD_OUT}
-    net = seeded(seed, lambda: UvUnet(shape)).to(device)
+    net = seeded(schedule.seed, lambda: UvUnet(shape)).to(device)
     before: dict[str, Any] = {}
-    if init is not None:
-        other, before = read_uv(uv_path(shape, init))
+    if schedule.init is not None:
+        other, before = UV_WEIGHTS.read(UV_WEIGHTS.path(shape, schedule.init))
         net.load_state_dict(other.state_dict())
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
@@ -77,26 +72,22 @@ def train_uv(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        model=net,
-        optimizer=optimizer,
-        step=step,
-        validate=validate,
-        folder=out,
-        budget_min=budget_min,
-        steps=steps,
-        seed=seed,
-        batch=batch,
-        warmup=100,
-        clip=1.0,
-        device=device,
-        amp=amp,
-        validations=6,
-        arguments={
-            "masks": shape.masks,
-            "filters": shape.filters,
-            "data": recipe_digest(data),
-            "init_samples": before.get("samples", 0),
-        },
+        Task(
+            net,
+            optimizer,
+            step,
+            validate,
+            batch=batch,
+            arguments={
+                "masks": shape.masks,
+                "filters": shape.filters,
+                "data": recipe_digest(data),
+                "init_samples": before.get("samples", 0),
+            },
+        ),
+        out,
+        schedule,
+        Regime(warmup=100, clip=1.0, amp=True, validations=6),
     )
     found = {
         f"{split}_{name}": value
@@ -107,12 +98,12 @@ def train_uv(
     facts = {
         "data": recipe_digest(data),
         "bodies": len(known),
-        "seed": seed,
+        "seed": schedule.seed,
         "steps": result.steps,
         "samples": before.get("samples", 0) + result.samples,
         "scores": found,
     }
-    save_uv(uv_path(shape, out), net, facts)
+    UV_WEIGHTS.save(UV_WEIGHTS.path(shape, out), net, facts)
     return found
 
 

@@ -7,6 +7,7 @@ import json
 import os
 import zipfile
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,32 +30,43 @@ VERSION = 2
 _PACK: dict[str, Pack] = {}
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """What samples are made of a pack.
+
+    bodies : of the training split; valid : of each of the two held-out splits, with dense grids
+    seed : of all that is drawn at random
+    pictures : add drawn pictures, labels, depth and UV images (four views of each body), which cost most of the space
+    shapes : add the parts' masks and distances, which cost most of the time; textures are learned without
+    """
+
+    bodies: int = 2000
+    valid: int = 48
+    seed: int = 0
+    pictures: bool = True
+    shapes: bool = True
+
+
 def build(
     pack: Path,
     out: Path,
+    wanted: Wanted = Wanted(),
     *,
-    bodies: int = 2000,
-    valid: int = 48,
-    seed: int = 0,
     jobs: int = 1,
-    pictures: bool = True,
-    shapes: bool = True,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
     """Make a folder of shards from a pack; what is there already, of the same recipe, is left as it is.
 
-    bodies : of the training split; valid : of each of the two held-out splits, with dense grids
-    pictures : add drawn pictures, labels, depth and UV images (four views of each body), which cost most of the space
-    shapes : add the parts' masks and distances, which cost most of the time; textures are learned without
     report : called with shards done and wanted
     """
+    seed, pictures, shapes = wanted.seed, wanted.pictures, wanted.shapes
     digest = hashlib.sha256(pack.read_bytes()).hexdigest() if pack.is_file() else ""
     load_pack(pack)
     recipe = {"version": VERSION, "pack": digest, "seed": seed, "pictures": pictures, "shapes": shapes}
     _check_recipe(out, recipe)
     tasks = []
     for split in SPLITS:
-        count, step = (bodies, SHARD) if split == "train" else (valid, VALID_SHARD)
+        count, step = (wanted.bodies, SHARD) if split == "train" else (wanted.valid, VALID_SHARD)
         for index, first in enumerate(range(0, count, step)):
             rows = range(first, min(first + step, count))
             path = out / f"{split}-{index:05d}.npz"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.records import BODY_PARTS, JOINT, PART
+from fig2mesh.skeleton import BODY_PARTS, BONES, JOINT, PART
 from fig2mesh.training.drawing.marks import Picture, lay, stroke
 
 TILE: Final = 112
@@ -25,15 +25,6 @@ REACH: Final = 1.15
 """Half of what a tile without a frame of its own shows, FIGURE units, about the pelvis or the joints' middle."""
 SHOWN: Final = ("torso", "head", "l_hand", "l_upper_leg", "r_foot")
 """The parts whose masks are shown."""
-# fmt: off
-LIMBS: Final = (
-    ("head", "eyes"), ("head", "neck"), ("neck", "thorax"), ("thorax", "pelvis"),
-    *((f"{s}_{a}" if a[0] != "!" else a[1:], f"{s}_{b}") for s in "lr" for a, b in (
-        ("!thorax", "shoulder"), ("shoulder", "elbow"), ("elbow", "wrist"), ("wrist", "hand"),
-        ("!pelvis", "hip"), ("hip", "knee"), ("knee", "ankle"), ("ankle", "foot"))),
-)
-# fmt: on
-"""Joints that the overlay joins."""
 EMPTY, PAPER, INK = 226.0, 250.0, (40.0, 40.0, 46.0)
 SIDE_INK: Final = {"l": (40.0, 80.0, 220.0), "r": (220.0, 50.0, 40.0)}
 
@@ -134,7 +125,7 @@ def _skeleton(picture: Picture, joints: NDArray[Any]) -> Picture:
     """The picture of the front with the body's joints over it: left blue, right red."""
     scale = TILE / (2 * REACH)
     pixels = np.stack([(joints[:, 0] + REACH) * scale, (REACH - joints[:, 1]) * scale], axis=1)
-    for start, end in LIMBS:
+    for start, end in BONES:
         line = np.zeros(picture.shape[:2], np.float32)
         stroke(line, pixels[[JOINT[start], JOINT[end]]], 1.3)
         stroke(line, pixels[JOINT[end]], 3.2)

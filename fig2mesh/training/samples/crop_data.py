@@ -119,8 +119,9 @@ def _check_recipe(out: Path, recipe: dict[str, Any]) -> None:
 def _shard(pack: str, kind: str, split: str, rows: range, seed: int, path: Path) -> None:
     import cv2
 
+    from fig2mesh.training.drawing.crop import Crop
     from fig2mesh.training.drawing.doodles import Doodler
-    from fig2mesh.training.samples.crops import Crop, body_crops
+    from fig2mesh.training.samples.crops import body_crops
 
     cv2.setNumThreads(1)
     if pack not in _PACK:

@@ -9,17 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.nets.figure_parser import INPUT
-from fig2mesh.records import PART_NAMES
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT_MIRROR, PART_MIRROR
 from fig2mesh.training.drawing.background import draw_background
 from fig2mesh.training.samples.crop_data import Crops
 
-# fmt: off
-MIRRORED: Final = np.array([
-    PART_NAMES.index({"l_": "r_", "r_": "l_"}.get(name[:2], name[:2]) + name[2:]) for name in PART_NAMES
-], np.uint8)
-# fmt: on
-"""Part label of the other side."""
+OTHER_SIDE: Final = np.array(PART_MIRROR, np.uint8)
+"""`PART_MIRROR`, to look up label pictures in."""
 
 MAPS: Final = ("coast", "realms", "fields", "town", "paper", "coast", "town", "paper")
 
@@ -78,7 +73,7 @@ class Viewer:
         labels = cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST)
         joints = (joints - 0.5) @ matrix[:, :2].T + matrix[:, 2] + 0.5
         if rng.random() < 0.5:
-            picture, labels = picture[:, ::-1], MIRRORED[labels[:, ::-1]]
+            picture, labels = picture[:, ::-1], OTHER_SIDE[labels[:, ::-1]]
             joints = joints[list(JOINT_MIRROR)] * [-1, 1] + [self.size, 0]
             visible = visible[list(JOINT_MIRROR)]
         share = (joints / self.size).astype(np.float32)

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.camera import axes
-from fig2mesh.records import JOINT, JOINT_NAMES, PART
+from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.subject import Subject, draw_subject
 from fig2mesh.training.drawing.background import draw_background
+from fig2mesh.training.drawing.crop import MARGIN, ROOM, Crop, cut, seen_joints
 from fig2mesh.training.drawing.draw import Layers, draw
 from fig2mesh.training.drawing.pictures import view_face, view_layers
 from fig2mesh.training.drawing.raster import rasterise
 from fig2mesh.training.drawing.styles import random_style
 from fig2mesh.training.drawing.worn import put_on, things
-
-SIZE: Final = 256
-"""Pixels a side of a crop."""
 
 DRAWN: Final = 320
 """Pixels a side of the picture that a crop is cut from."""
@@ -30,50 +27,12 @@ DRAWN: Final = 320
 FILL: Final = 0.72
 """Share of that picture that the body takes."""
 
-MARGIN, ROOM = 0.06, 0.3
-"""What is kept round a figure with transparency, and round one on a background of its own; share of its size."""
 
 ON_PAPER: Final = 0.4
 """Share of crops that have a background of their own."""
 
 YAWS: Final = ((0.0, 22.0, 0.64), (90.0, 22.0, 0.13), (-90.0, 22.0, 0.13), (180.0, 30.0, 0.1))
 """Mean and spread of the camera's yaw, degrees, on top of the body's own turn; and how often."""
-
-# fmt: off
-_LIMBS: Final = {
-    "shoulder": ("torso", "upper_arm"), "elbow": ("upper_arm", "lower_arm"), "wrist": ("lower_arm", "hand"),
-    "hand": ("hand", "lower_arm"), "hip": ("torso", "upper_leg"), "knee": ("upper_leg", "lower_leg"),
-    "ankle": ("lower_leg", "foot"), "foot": ("foot",),
-}
-# fmt: on
-
-OWN: Final = {
-    "head": ("head", "hair"),
-    "eyes": ("head",),
-    "neck": ("head", "torso", "hair"),
-    "thorax": ("torso",),
-    "pelvis": ("torso", "l_upper_leg", "r_upper_leg"),
-    **{
-        f"{side}_{joint}": tuple(part if part == "torso" else f"{side}_{part}" for part in parts)
-        for side in "lr"
-        for joint, parts in _LIMBS.items()
-    },
-}
-"""A joint is drawn where its pixel, or one beside it, shows one of these parts."""
-
-ALLOWED: Final = np.zeros((len(JOINT_NAMES), 18), bool)
-for _joint, _parts in OWN.items():
-    ALLOWED[JOINT[_joint], [PART[_part] for _part in _parts]] = True
-
-
-class Crop(NamedTuple):
-    """rgba : (256, 256, 4) uint8, straight alpha; all opaque where the figure has a background of its own
-    labels : (256, 256) uint8, `PART_NAMES`; joints : (21, 2) float32, pixels; visible : (21,) bool"""
-
-    rgba: NDArray[np.uint8]
-    labels: NDArray[np.uint8]
-    joints: NDArray[np.float32]
-    visible: NDArray[np.bool_]
 
 
 def body_crops(pack: Pack, split: str, number: int, count: int = 4) -> list[Crop]:
@@ -85,43 +44,6 @@ def body_crops(pack: Pack, split: str, number: int, count: int = 4) -> list[Crop
         mean, spread, _ = YAWS[int(rng.choice(len(YAWS), p=[share for *_, share in YAWS]))]
         crops.append(_draw(_turned(subject, float(rng.normal(mean, spread))), rng))
     return [crop for crop in crops if crop is not None]
-
-
-def cut(
-    rgba: NDArray[np.uint8],
-    labels: NDArray[np.uint8],
-    joints: NDArray[np.floating],
-    visible: NDArray[np.bool_],
-    margin: float,
-) -> Crop | None:
-    """The square round the figure, resized to `SIZE`; None where there is none. Beyond the picture nothing is seen."""
-    rows, columns = np.flatnonzero((labels > 0).any(axis=1)), np.flatnonzero((labels > 0).any(axis=0))
-    if len(rows) < 8 or len(columns) < 4:
-        return None
-    side = max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1
-    edge = side * (1 + 2 * margin)
-    low = np.array([columns[0] + columns[-1] + 1, rows[0] + rows[-1] + 1]) / 2 - edge / 2
-    if margin == ROOM:
-        edge = min(edge, float(min(labels.shape)))
-        low = np.clip(low, 0, np.array(labels.shape[::-1]) - edge)
-    scale = SIZE / edge
-    matrix = np.array([[scale, 0, -low[0] * scale], [0, scale, -low[1] * scale]])
-    premultiplied = rgba.astype(np.float32)
-    premultiplied[..., :3] *= premultiplied[..., 3:] / 255
-    # Areas are averaged where pixels get larger.
-    soft = cv2.GaussianBlur(premultiplied, (0, 0), max(0.35 / scale, 0.1)) if scale < 0.9 else premultiplied
-    moved = cv2.warpAffine(soft, _centred(matrix), (SIZE, SIZE), flags=cv2.INTER_LINEAR)
-    moved[..., :3] *= 255 / np.maximum(moved[..., 3:], 1)
-    turned = cv2.warpAffine(labels, _centred(matrix), (SIZE, SIZE), flags=cv2.INTER_NEAREST)
-    placed = (np.asarray(joints, np.float64)[:, :2] - low) * scale
-    return Crop(np.clip(np.rint(moved), 0, 255).astype(np.uint8), turned, placed.astype(np.float32), visible)
-
-
-def _centred(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """OpenCV's pixel centres lie on whole numbers, ours half a pixel further."""
-    out = matrix.copy()
-    out[:, 2] += 0.5 * matrix[:, :2].sum(axis=1) - 0.5
-    return out
 
 
 def _turned(subject: Subject, yaw_deg: float) -> Subject:
@@ -176,7 +98,7 @@ def _cut_out(layers: Layers, materials: list[str], rng: np.random.Generator, sty
 
 
 def _seen(subject: Subject):  # type: ignore[no-untyped-def]
-    """As `samples.scene` from the front, with room round the body."""
+    """As `drawing.scene.scene` from the front, with room round the body."""
     vertices = np.concatenate([subject.vertices, subject.skirt_vertices])
     faces = np.concatenate([subject.rig.faces, subject.skirt_faces + len(subject.vertices)])
     label = np.concatenate([subject.rig.face_part, np.full(len(subject.skirt_faces), PART["garment"], np.uint8)])
@@ -185,15 +107,3 @@ def _seen(subject: Subject):  # type: ignore[no-untyped-def]
     corner = (low + high) / 2 - pitch * DRAWN / 2
     raster = rasterise(vertices, faces, size=DRAWN, low=corner, pitch=pitch)
     return raster, raster.pick(label), corner, pitch
-
-
-def seen_joints(labels: NDArray[np.uint8], joints: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """(21,) bool: joints (21, 2) in pixels whose place shows one of their own parts."""
-    height, width = labels.shape
-    out = np.zeros(len(joints), bool)
-    for index, (x, y) in enumerate(joints):
-        column, row = int(x), int(y)
-        if 0 <= column < width and 0 <= row < height:
-            near = labels[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
-            out[index] = ALLOWED[index, near].any()
-    return out

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from fig2mesh.nets.texture_fill import TextureFill, sample
-from fig2mesh.training.networks.train_fill import gather
+from fig2mesh.training.samples.texels import gather
 from fig2mesh.training.samples.texture_data import Drawings, load_drawings
 from fig2mesh.training.samples.unfold import places, unfold
 

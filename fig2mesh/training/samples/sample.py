@@ -7,24 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.records import BODY_PARTS, PART
-from fig2mesh.skeleton import part_centre
+from fig2mesh.skeleton import BODY_PARTS, part_centre
 from fig2mesh.training.bodies.partition import PartTopology
 from fig2mesh.training.bodies.subject import Subject
-from fig2mesh.training.drawing.raster import Raster, coverage, rasterise
+from fig2mesh.training.drawing.raster import coverage
+from fig2mesh.training.drawing.scene import SCENE, VIEWS, scene
 from fig2mesh.training.samples.sdf import signed_distance
-
-VIEWS: tuple[NDArray[np.float64], ...] = tuple(axes(yaw) for yaw in VIEW_YAW_DEG.values())
-"""The four sides of paper §3: p_view = VIEWS[k] @ p."""
 
 POINTS = 2000
 """Inside and as many outside points a part (paper §4.2)."""
 
 MASK = 64
 GRID = 64
-SCENE = 448
-"""Pixels a side of the picture in which is decided what hides what."""
 
 MARGIN = 1.1
 """Edge of a part's cube relative to the smallest that holds it."""
@@ -127,22 +121,6 @@ def filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
         if (grown == outside).all():
             return ~outside[1:-1, 1:-1]
         outside = grown
-
-
-def scene(
-    subject: Subject, view: int, size: int = SCENE
-) -> tuple[Raster, NDArray[np.uint8], NDArray[np.float64], float]:
-    """What is seen from one side: the raster of body and skirt, part labels, lower left corner and pixel's edge."""
-    body = subject.vertices @ VIEWS[view].T
-    skirt = subject.skirt_vertices @ VIEWS[view].T
-    vertices = np.concatenate([body, skirt])
-    faces = np.concatenate([subject.rig.faces, subject.skirt_faces + len(body)])
-    label = np.concatenate([subject.rig.face_part, np.full(len(subject.skirt_faces), PART["garment"], np.uint8)])
-    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
-    pitch = float((high - low).max()) / (0.9 * size)
-    corner = (low + high) / 2 - pitch * size / 2
-    raster = rasterise(vertices, faces, size=size, low=corner, pitch=pitch)
-    return raster, raster.pick(label), corner, pitch
 
 
 def _visible(subject: Subject, centre: NDArray[np.float64], edge: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.samples.build import read_shard, shards
 
 NAMES: Final = ("picture", "labels", "depth", "uv")

@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT, PART, Pose3D
+from fig2mesh.records import Pose3D
+from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.texture.sides import Sides, body_labels
 from fig2mesh.texture.space import inwards
 from fig2mesh.training.samples.build import read_shard, shards

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import SIZE, inwards, shown_alike, spread, trust
 from fig2mesh.training.samples.texture_data import Drawings
 

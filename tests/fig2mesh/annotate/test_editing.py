@@ -19,9 +19,9 @@ from fig2mesh.annotate.editing import STANDING, Subject, begin, packed, standing
 from fig2mesh.annotate.job import main_job
 from fig2mesh.annotate.server import HEADER, annotation_server
 from fig2mesh.errors import FigureError, InputError
-from fig2mesh.parse.annotation import COLOURS, Annotation, on_whole_picture, write_annotation
+from fig2mesh.parse.annotation import Annotation, on_whole_picture, write_annotation
 from fig2mesh.parse.read import read_figure
-from fig2mesh.records import JOINT, JOINT_NAMES, PART_NAMES
+from fig2mesh.skeleton import JOINT, JOINT_NAMES, LABEL_COLOURS, PART_NAMES
 from tests.browser import serving
 from tests.drawn import DrawnFiles, write_figure
 
@@ -84,7 +84,7 @@ def test_saved_files_read_back_as_they_were(files: DrawnFiles, tmp_path: Path) -
     with Image.open(folder / "part_labels.png") as image:
         assert json.loads(image.info["legend"])["17"] == "prop"
         x, y = figure.joints_px[JOINT["thorax"]].astype(int).tolist()
-        assert image.convert("RGB").getpixel((x, y)) == COLOURS[17]
+        assert image.convert("RGB").getpixel((x, y)) == LABEL_COLOURS[17]
     with pytest.raises(InputError, match="exists already"):
         write_annotation(folder, start, "drawn.png")
     assert read_figure(files.image, keypoints=folder / "keypoints.json").depth_order == {"r_arm": "front"}

@@ -14,7 +14,7 @@ from fig2mesh.annotate.job import page, preview_page
 from fig2mesh.annotate.server import annotation_server
 from fig2mesh.parse.annotation import Annotation, write_annotation
 from fig2mesh.parse.read import read_figure
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, PART
 from tests.browser import chromium, pixels, serving
 from tests.drawn import DrawnFiles, write_figure
 from tests.node import ROOT, installed, runner

@@ -15,11 +15,11 @@ from typing import Any
 
 import pystac
 import pytest
-from fig2mesh.batch.tasks import FORMATS
 
 from exporters.tiles.tileset import VISIBLE_RANGE_PER_ERROR
 from exporters.validate import validate
 from fig2mesh.batch.ledger import WORK
+from fig2mesh.batch.tasks import FORMATS
 from fig2mesh.commands.main import main
 from tests.benchmarks.batch import convert
 from tests.exporters.walk import contents

@@ -5,8 +5,7 @@ import pytest
 
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
-from fig2mesh.records import PART_NAMES
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.skeleton import FIGURE_HEIGHT, PART_NAMES
 
 
 def hull_of_balls(start, end, first, second, points, steps=4001):

@@ -13,7 +13,8 @@ from fig2mesh.field.camera import framing, orthographic
 from fig2mesh.field.compiled import THREADS_VARIABLE
 from fig2mesh.field.reference import trace_reference
 from fig2mesh.field.trace import trace
-from fig2mesh.records import BODY_PARTS, PartSdf, Rays
+from fig2mesh.records import PartSdf, Rays
+from fig2mesh.skeleton import BODY_PARTS
 
 from .fields import BALL, LIMB, ball, first_below, gap, harsh, limb, pair, random_rays, towards
 

@@ -9,7 +9,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.mesh.newton import newton
 from fig2mesh.mesh.scan import scan
 from fig2mesh.mesh.thin import thin
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 
 from .solids import SOLIDS, SPACING, Formula
 

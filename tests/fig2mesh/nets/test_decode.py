@@ -7,7 +7,7 @@ import torch
 from fig2mesh.errors import InputError
 from fig2mesh.nets import weights
 from fig2mesh.nets.decode import decode, decode_counted, decode_dense, decode_many
-from fig2mesh.nets.disn import Disn, DisnShape, as_input
+from fig2mesh.nets.disn import PART_WEIGHTS, Disn, DisnShape, as_input
 from fig2mesh.skeleton import ANCHORS
 
 from .test_disn import disc, made
@@ -100,12 +100,12 @@ def test_untrained_and_degenerate_input_stays_finite(kind, shown):
 
 def test_weights_come_back_in_half_precision(tmp_path, capsule):
     net = capsule
-    path = weights.disn_path(net.shape, tmp_path)
-    weights.save_disn(path, net, {"seed": 3, "scores": {"iou": 0.5}})
+    path = PART_WEIGHTS.path(net.shape, tmp_path)
+    PART_WEIGHTS.save(path, net, {"seed": 3, "scores": {"iou": 0.5}})
     first = path.read_bytes()
-    weights.save_disn(path, net, {"seed": 3, "scores": {"iou": 0.5}})
+    PART_WEIGHTS.save(path, net, {"seed": 3, "scores": {"iou": 0.5}})
     assert path.read_bytes() == first
-    found, facts = weights.read_disn(path)
+    found, facts = PART_WEIGHTS.read(path)
     assert found.shape == net.shape
     assert (facts["seed"], facts["scores"]["iou"]) == (3, 0.5)
     for name, value in net.state_dict().items():
@@ -115,25 +115,24 @@ def test_weights_come_back_in_half_precision(tmp_path, capsule):
 
 def test_missing_and_broken_weights_are_told(tmp_path, monkeypatch):
     monkeypatch.setattr(weights, "FOLDER", tmp_path)
-    monkeypatch.setattr(weights.disn_path, "__defaults__", (tmp_path,))
     with pytest.raises(InputError, match="no such file"):
-        weights.load("hand", "two-stream")
-    path = weights.disn_path(DisnShape.of("hand", "two-stream"), tmp_path)
+        PART_WEIGHTS.shipped(DisnShape.of("hand", "two-stream"))
+    path = PART_WEIGHTS.path(DisnShape.of("hand", "two-stream"), tmp_path)
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(InputError, match="no readable weights"):
-        weights.load("hand", "two-stream")
+        PART_WEIGHTS.shipped(DisnShape.of("hand", "two-stream"))
     weights.save(path, {"x": torch.zeros(2)}, {"shape": {"kind": "hand", "variant": "two-stream"}})
     with pytest.raises(InputError, match="not the weights"):
-        weights.load("hand", "two-stream")
+        PART_WEIGHTS.shipped(DisnShape.of("hand", "two-stream"))
     weights.save(path, {"x": torch.tensor([np.nan])}, {})
     with pytest.raises(InputError, match="not finite"):
-        weights.load("hand", "two-stream")
+        PART_WEIGHTS.shipped(DisnShape.of("hand", "two-stream"))
 
 
 def test_weights_are_read_once(tmp_path, monkeypatch):
     shape = DisnShape("foot")
-    weights.save_disn(tmp_path / weights.disn_path(shape).name, made("foot", "two-stream-pose"), {})
-    monkeypatch.setattr(weights.disn_path, "__defaults__", (tmp_path,))
-    weights.load.cache_clear()
-    assert weights.load("foot") is weights.load("foot")
-    weights.load.cache_clear()
+    PART_WEIGHTS.save(tmp_path / PART_WEIGHTS.path(shape).name, made("foot", "two-stream-pose"), {})
+    monkeypatch.setattr(weights, "FOLDER", tmp_path)
+    weights.read_shipped.cache_clear()
+    assert PART_WEIGHTS.shipped(shape) is PART_WEIGHTS.shipped(shape)
+    weights.read_shipped.cache_clear()

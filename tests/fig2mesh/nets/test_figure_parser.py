@@ -8,18 +8,7 @@ import pytest
 import torch
 
 from fig2mesh.errors import InputError
-from fig2mesh.nets.figure_parser import (
-    HEAT,
-    INPUT,
-    JOINTS,
-    LABELS,
-    MASK,
-    FigureParser,
-    load,
-    parser_path,
-    read_parser,
-    save_parser,
-)
+from fig2mesh.nets.figure_parser import HEAT, INPUT, JOINTS, LABELS, MASK, PARSER_WEIGHTS, SHIPPED, FigureParser
 from fig2mesh.nets.part_size import PartSizeNet, SizeShape
 
 
@@ -39,9 +28,9 @@ def test_an_untrained_network_says_nothing_of_masks() -> None:
 
 def test_weights_read_back(tmp_path: Path) -> None:
     net = FigureParser().eval()
-    path = parser_path(tmp_path)
-    save_parser(path, net, {"seed": 3})
-    again, facts = read_parser(path)
+    path = PARSER_WEIGHTS.path(SHIPPED, tmp_path)
+    PARSER_WEIGHTS.save(path, net, {"seed": 3})
+    again, facts = PARSER_WEIGHTS.read(path)
     assert facts["seed"] == 3
     picture = torch.rand(1, 3, INPUT, INPUT)
     with torch.no_grad():
@@ -51,12 +40,12 @@ def test_weights_read_back(tmp_path: Path) -> None:
 def test_other_weights_are_refused(tmp_path: Path) -> None:
     from fig2mesh.nets import weights
 
-    path = parser_path(tmp_path)
+    path = PARSER_WEIGHTS.path(SHIPPED, tmp_path)
     weights.save(path, PartSizeNet(SizeShape("head")).state_dict(), {"shape": {"width": [1, 1, 1, 1]}})
     with pytest.raises(InputError, match="not the weights of a figure parser"):
-        read_parser(path)
+        PARSER_WEIGHTS.read(path)
 
 
 def test_what_ships_is_small() -> None:
-    assert parser_path().stat().st_size < 15e6
-    assert sum(parameter.numel() for parameter in load().parameters()) < 4e6
+    assert PARSER_WEIGHTS.path(SHIPPED).stat().st_size < 15e6
+    assert sum(parameter.numel() for parameter in PARSER_WEIGHTS.shipped(SHIPPED).parameters()) < 4e6

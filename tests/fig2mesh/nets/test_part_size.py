@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from fig2mesh.nets.part_size import PartSizeNet, SizeShape, part_size, read_size, save_size, size_path
-from fig2mesh.records import PART, PART_NAMES
-from fig2mesh.skeleton import JOINT_MIRROR, KINDS, part_centre
+from fig2mesh.nets.part_size import SIZE_WEIGHTS, PartSizeNet, SizeShape, part_size
+from fig2mesh.skeleton import JOINT_MIRROR, KINDS, PART, PART_NAMES, part_centre
 from fig2mesh.training.networks.loop import seeded
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_size import mask_extent, read_sizes, train_size
 
 
@@ -102,13 +102,13 @@ def test_four_views_of_both_sides(tmp_path: Path) -> None:
 
 def test_training_learns_a_rule_and_repeats_itself(tmp_path: Path) -> None:
     write_shards(tmp_path, bodies=60)
-    _, before = train_size(tmp_path, "lower_arm", tmp_path / "a", steps=1)
-    net, after = train_size(tmp_path, "lower_arm", tmp_path / "b", steps=400)
+    _, before = train_size(tmp_path, "lower_arm", tmp_path / "a", Schedule(steps=1))
+    net, after = train_size(tmp_path, "lower_arm", tmp_path / "b", Schedule(steps=400))
     assert after["valid-characters_none_depth_percent"] < 0.6 * before["valid-characters_none_depth_percent"]
-    again, _ = train_size(tmp_path, "lower_arm", tmp_path / "c", steps=400)
+    again, _ = train_size(tmp_path, "lower_arm", tmp_path / "c", Schedule(steps=400))
     for one, other in zip(net.parameters(), again.parameters(), strict=True):
         assert torch.equal(one, other)
-    stored, facts = read_size(size_path("lower_arm", tmp_path / "b"))
+    stored, facts = SIZE_WEIGHTS.read(SIZE_WEIGHTS.path(SizeShape("lower_arm"), tmp_path / "b"))
     assert facts["steps"] == 400
     np.testing.assert_allclose(
         part_size(stored, PART["l_lower_arm"], joints())[0], part_size(net, PART["l_lower_arm"], joints())[0], rtol=1e-2
@@ -116,7 +116,7 @@ def test_training_learns_a_rule_and_repeats_itself(tmp_path: Path) -> None:
 
 
 def test_weights_round_trip(tmp_path: Path) -> None:
-    save_size(tmp_path / "x.safetensors", network("head"), {"seed": 4})
-    net, facts = read_size(tmp_path / "x.safetensors")
+    SIZE_WEIGHTS.save(tmp_path / "x.safetensors", network("head"), {"seed": 4})
+    net, facts = SIZE_WEIGHTS.read(tmp_path / "x.safetensors")
     assert net.shape == SizeShape("head")
     assert facts["seed"] == 4

@@ -10,9 +10,8 @@ import pytest
 import torch
 
 from fig2mesh.errors import InputError
-from fig2mesh.nets.pose_lift import PoseLift, PoseLiftShape, lift, lift_joints, pose_path, read_pose, save_pose
-from fig2mesh.records import JOINT
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLift, PoseLiftShape, lift, lift_joints
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from fig2mesh.training.networks.loop import seeded
 
 SMALL = PoseLiftShape(width=64)
@@ -99,9 +98,9 @@ def test_only_the_network_for_drawings_lifts_them() -> None:
 
 def test_half_precision_moves_no_joint(tmp_path: Path) -> None:
     net = network(PoseLiftShape())
-    path = pose_path(net.shape, tmp_path)
-    save_pose(path, net, {"seed": 1})
-    again, facts = read_pose(path)
+    path = POSE_WEIGHTS.path(net.shape, tmp_path)
+    POSE_WEIGHTS.save(path, net, {"seed": 1})
+    again, facts = POSE_WEIGHTS.read(path)
     assert facts["seed"] == 1
     assert again.shape == net.shape
     drawn = figure()
@@ -114,4 +113,4 @@ def test_other_weights_are_refused(tmp_path: Path) -> None:
 
     weights.save(tmp_path / "a.safetensors", {"x": torch.zeros(3)}, {"shape": {"joints": 21}})
     with pytest.raises(InputError, match="not the weights of a pose network"):
-        read_pose(tmp_path / "a.safetensors")
+        POSE_WEIGHTS.read(tmp_path / "a.safetensors")

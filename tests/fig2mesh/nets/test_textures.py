@@ -10,12 +10,12 @@ import pytest
 import torch
 
 from fig2mesh.errors import InputError
-from fig2mesh.nets.head_hsv import HeadHsv, HeadShape, disc_value, enhance, read_head, rgb_of, save_head
+from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadHsv, HeadShape, disc_value, enhance, rgb_of
 from fig2mesh.nets.hourglass import Hourglass
-from fig2mesh.nets.texture_fill import FillShape, TextureFill, fill_inputs, read_fill, sample, save_fill
-from fig2mesh.nets.uv_unet import PARTS, UvUnet, UvUnetShape, infer_uv, read_uv, save_uv, uv_inputs
-from fig2mesh.nets.view_refine import RefineShape, ViewRefine, read_refine, refine, save_refine
-from fig2mesh.records import PART
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, fill_inputs, sample
+from fig2mesh.nets.uv_unet import PARTS, UV_WEIGHTS, UvUnet, UvUnetShape, infer_uv, uv_inputs
+from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape, ViewRefine, refine
+from fig2mesh.skeleton import PART
 from fig2mesh.training.networks.loop import seeded
 
 
@@ -129,10 +129,10 @@ def test_an_untrained_refining_network_changes_nothing() -> None:
 
 def test_weights_are_read_as_they_were_written(tmp_path: Path) -> None:
     for name, net, save, read in (
-        ("uv", UvUnet(UvUnetShape(False, 4)), save_uv, read_uv),
-        ("fill", TextureFill(FillShape(16, 4)), save_fill, read_fill),
-        ("refine", ViewRefine(RefineShape(4)), save_refine, read_refine),
-        ("head", HeadHsv(HeadShape(4, 8)), save_head, read_head),
+        ("uv", UvUnet(UvUnetShape(False, 4)), UV_WEIGHTS.save, UV_WEIGHTS.read),
+        ("fill", TextureFill(FillShape(16, 4)), FILL_WEIGHTS.save, FILL_WEIGHTS.read),
+        ("refine", ViewRefine(RefineShape(4)), REFINE_WEIGHTS.save, REFINE_WEIGHTS.read),
+        ("head", HeadHsv(HeadShape(4, 8)), HEAD_WEIGHTS.save, HEAD_WEIGHTS.read),
     ):
         path = tmp_path / f"{name}.safetensors"
         save(path, net, {"seed": 3})
@@ -141,4 +141,4 @@ def test_weights_are_read_as_they_were_written(tmp_path: Path) -> None:
         for key, value in net.state_dict().items():
             torch.testing.assert_close(found.state_dict()[key].float(), value.float(), atol=1e-3, rtol=1e-3)
         with pytest.raises(InputError, match="not the weights"):
-            (read_fill if name == "uv" else read_uv)(path)
+            (FILL_WEIGHTS.read if name == "uv" else UV_WEIGHTS.read)(path)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_writers import WRITERS
 from fig2mesh.parse.keypoints import read_keypoints
-from fig2mesh.records import JOINT_NAMES
+from fig2mesh.skeleton import JOINT_NAMES
 
 NUMBERS = st.floats() | st.integers()
 KEYS = st.sampled_from(

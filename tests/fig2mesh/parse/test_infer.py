@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fig2mesh.measure.parser import GROUNDS, bare, drawings, evaluate_parse, measure
 from fig2mesh.parse.infer import infer_figure, look, on_light, spread, square
 from fig2mesh.parse.picture import read_rgba
-from fig2mesh.records import JOINT, PART
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
+from fig2mesh.training.evaluate.parser import GROUNDS, bare, drawings, evaluate_parse, measure
 
 FARMER = Path(__file__).parents[3] / "examples" / "figures" / "farmer"
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from fig2mesh.commands.main import main
 from fig2mesh.parse.read import read_figure
-from fig2mesh.records import JOINT_NAMES, PART_NAMES
+from fig2mesh.skeleton import JOINT_NAMES, PART_NAMES
 from tests.drawn import draw_figure, write_figure
 
 FARMER = Path(__file__).parents[3] / "examples" / "figures" / "farmer" / "image.png"

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_names import canonical
-from fig2mesh.parse.joint_writers import LONG_NAMES, SKELETON, WRITERS
+from fig2mesh.parse.joint_writers import LONG_NAMES, WRITERS
 from fig2mesh.parse.keypoints import read_keypoints
-from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import BONES, JOINT, JOINT_NAMES
 from tests.drawn import JOINTS
 
 DRAWN = np.array([JOINTS[name] for name in JOINT_NAMES], np.float32)
@@ -53,10 +53,10 @@ def test_round_trip(kind: str, data: st.DataObject, tmp_path: Path) -> None:
 
 
 def test_every_bone_joins_two_joints_and_all_are_joined() -> None:
-    assert len(SKELETON) == len(JOINT_NAMES) - 1
+    assert len(BONES) == len(JOINT_NAMES) - 1
     reached = {"head"}
-    for _ in SKELETON:
-        reached |= {name for bone in SKELETON if reached & set(bone) for name in bone}
+    for _ in BONES:
+        reached |= {name for bone in BONES if reached & set(bone) for name in bone}
     assert reached == set(JOINT_NAMES)
 
 

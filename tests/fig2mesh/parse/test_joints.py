@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fig2mesh.parse.joints import decode, doubts, visible_inside
-from fig2mesh.records import JOINT
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from tests.drawn import JOINTS, SIZE
 
 CELLS = 48

@@ -11,7 +11,7 @@ from PIL import Image
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.read import read_figure
-from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.skeleton import JOINT, JOINT_NAMES
 from tests.drawn import JOINTS, DrawnFiles, draw_figure, keypoints, write_figure
 
 

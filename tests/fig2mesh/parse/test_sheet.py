@@ -13,7 +13,7 @@ from PIL import Image
 from fig2mesh.commands.main import main
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parse.sheet import STEP, _centres, _edges, _shared
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import JOINT
 
 EXAMPLES = Path(__file__).parents[3] / "examples" / "figures"
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from fig2mesh.parse.silhouette import agreement, by_colour, guided, plain_sheet, refine
+from fig2mesh.parse.colours import by_colour, guided
+from fig2mesh.parse.silhouette import agreement, plain_sheet, refine
 
 SIDE = 240
 Y, X = np.mgrid[:SIDE, :SIDE] + 0.5

@@ -12,7 +12,8 @@ from fig2mesh.parts.depth import mid_surface
 from fig2mesh.parts.limbs import make_limb
 from fig2mesh.parts.split import Split, head_radius, split
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import JOINT, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT
 from tests.drawn import Sketch
 
 

@@ -9,7 +9,8 @@ from fig2mesh.field.analytic import capsule, sample
 from fig2mesh.field.body import Body
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.fillets import RADIUS, make_fillets
-from fig2mesh.records import PART, PartSdf
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import PART
 
 PITCH = 0.01
 HALF = 0.5

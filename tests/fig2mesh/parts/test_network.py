@@ -10,8 +10,8 @@ from fig2mesh.nets.part_size import PartSizeNet, SizeShape
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.network import LEAST_EDGE, MASK, ROOM, hidden_parts, network_inputs, part_cubes, part_mask
 from fig2mesh.parts.split import Layer, Split
-from fig2mesh.records import BODY_PARTS, PART, PartSdf
-from fig2mesh.skeleton import KINDS, part_centre
+from fig2mesh.records import PartSdf
+from fig2mesh.skeleton import BODY_PARTS, KINDS, PART, part_centre
 
 PITCH = 0.01
 SIDE = 241

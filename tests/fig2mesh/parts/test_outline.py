@@ -16,7 +16,8 @@ from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import Outline, outline_parts
 from fig2mesh.parts.pieces import clean
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import BODY_PARTS, JOINT, JOINT_NAMES, PART, PART_NAMES, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import BODY_PARTS, JOINT, JOINT_NAMES, PART, PART_NAMES
 from tests.drawn import write_figure
 
 VOXEL = 0.012

@@ -12,7 +12,7 @@ from scipy import ndimage
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.owners import owners
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 
 PITCH = 0.01
 COUNT = 101

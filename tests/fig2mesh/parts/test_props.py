@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fig2mesh.measure.solid import inner_shells
 from fig2mesh.mesh.topology import check_solid
 from fig2mesh.parts.props import find_props, prop_depth
-from fig2mesh.records import JOINT, PART
+from fig2mesh.skeleton import JOINT, PART
 from tests.drawn import Assembled, Sketch, assemble
 
 STAFF = 8.0

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fig2mesh.image_frame import image_frame
 from fig2mesh.pose.network import lift_by_network, upright
-from fig2mesh.records import JOINT, JOINT_NAMES, Figure
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR, JOINT_NAMES
 from tests.drawn import JOINTS, draw_figure
 
 
@@ -52,12 +52,13 @@ def test_the_face_looks_at_the_viewer_and_depths_are_a_persons() -> None:
 
 @pytest.mark.parametrize("factor", [0.5, 3.0])
 def test_the_scale_of_a_drawing_does_not_matter(factor: float) -> None:
-    from fig2mesh.nets.pose_lift import lift_joints, load
+    from fig2mesh.nets.pose_lift import POSE_WEIGHTS, SHIPPED, lift_joints
 
+    net = POSE_WEIGHTS.shipped(SHIPPED)
     figure = drawn_figure()
     drawn = image_frame(figure).figure_from_image(figure.joints_px)
     np.testing.assert_allclose(
-        lift_joints(load(), factor * drawn), factor * lift_joints(load(), drawn), rtol=1e-3, atol=1e-3 * factor
+        lift_joints(net, factor * drawn), factor * lift_joints(net, drawn), rtol=1e-3, atol=1e-3 * factor
     )
 
 

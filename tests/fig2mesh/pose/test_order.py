@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from fig2mesh.pose.order import CHAINS, ordered
-from fig2mesh.records import JOINT, LIMBS, DepthOrder, Figure, Pose3D
+from fig2mesh.pose.order import ordered
+from fig2mesh.records import DepthOrder, Figure, Pose3D
+from fig2mesh.skeleton import JOINT, LIMB_JOINTS, LIMBS
 
 POSES = arrays(np.float32, (21, 3), elements=st.floats(-0.875, 0.875, width=32)).map(Pose3D)
 ORDERS = st.dictionaries(st.sampled_from(LIMBS), st.sampled_from(["front", "behind"]))
@@ -24,7 +25,7 @@ def test_only_the_depth_of_the_limbs_named_changes_and_has_the_sign_asked_for(
     moved = set()
     for limb, where in order.items():
         side, kind = limb.split("_")
-        chain = [JOINT[f"{side}_{name}"] for name in CHAINS[kind]]
+        chain = [JOINT[f"{side}_{name}"] for name in LIMB_JOINTS[kind]]
         moved |= set(chain[1:])
         away = (result[chain[1:], 2] - result[chain[0], 2]) * (1 if where == "front" else -1)
         assert (away >= 0.0799).all()
@@ -41,7 +42,7 @@ def test_front_and_behind_mirror_each_other_and_twice_is_once(pose: Pose3D, orde
     turned = ordered(pose, opposite).joints
     for limb in order:
         side, kind = limb.split("_")
-        chain = [JOINT[f"{side}_{name}"] for name in CHAINS[kind]]
+        chain = [JOINT[f"{side}_{name}"] for name in LIMB_JOINTS[kind]]
         root = pose.joints[chain[0], 2]
         np.testing.assert_allclose(turned[chain, 2] - root, root - once.joints[chain, 2], atol=1e-5)
 

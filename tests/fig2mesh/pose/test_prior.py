@@ -8,8 +8,8 @@ import pytest
 from fig2mesh.asset_frame import asset_from_figure
 from fig2mesh.image_frame import image_frame
 from fig2mesh.pose.prior import FORESHORTENED, MOST, lift
-from fig2mesh.records import JOINT, JOINT_NAMES, Figure, Pose3D
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.records import Figure, Pose3D
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_NAMES
 from tests.drawn import JOINTS, draw_figure
 
 

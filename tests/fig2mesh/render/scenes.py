@@ -10,8 +10,8 @@ from fig2mesh.field.body import Body
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.records import PART
 from fig2mesh.render.scene import FieldScene
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.sources import Sources
 
 TORSO, HEAD = PART["torso"], PART["head"]

@@ -10,9 +10,10 @@ from fig2mesh.field.compiled import THREADS_VARIABLE
 from fig2mesh.field.reference import trace_reference
 from fig2mesh.field.trace import trace
 from fig2mesh.image_frame import ImageFrame
-from fig2mesh.records import PART, Hits
+from fig2mesh.records import Hits
 from fig2mesh.render.frame import Frame, FrameCamera, render_frame
 from fig2mesh.render.surface_colours import SurfaceColours, surface_colours
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.sources import Sources
 from tests.fig2mesh.field.fields import harsh, pair
 

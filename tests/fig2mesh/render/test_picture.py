@@ -21,7 +21,6 @@ from fig2mesh.render.shading import (
     CLAY,
     FILL,
     KEY,
-    PART_COLOURS,
     decode,
     encode,
     fill_direction,
@@ -29,6 +28,7 @@ from fig2mesh.render.shading import (
     key_direction,
     lit,
 )
+from fig2mesh.skeleton import PART_COLOURS
 from tests.drawn import Sketch, assemble
 from tests.fig2mesh.render.scenes import (
     DRAWN,

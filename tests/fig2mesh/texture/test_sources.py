@@ -13,7 +13,8 @@ from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import outline_parts
 from fig2mesh.pose.prior import lift
-from fig2mesh.records import JOINT, JOINT_NAMES, PART, Figure
+from fig2mesh.records import Figure
+from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART
 from fig2mesh.texture.sources import Sources, continued, make_sources
 from tests.drawn import JOINTS, draw_figure
 

@@ -16,7 +16,8 @@ from fig2mesh.nets.head_hsv import HeadHsv, HeadShape
 from fig2mesh.nets.texture_fill import FillShape, TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
-from fig2mesh.records import JOINT, JOINT_NAMES, PART, Pose3D
+from fig2mesh.records import Pose3D
+from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART
 from fig2mesh.texture.sides import FILLED, Sides, body_labels, look_around
 from fig2mesh.texture.unseen import (
     TextureNets,

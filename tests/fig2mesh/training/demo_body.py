@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.draw import Layers
 from fig2mesh.training.drawing.faces import Face
 from fig2mesh.training.drawing.raster import rasterise

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.field.camera import axes
-from fig2mesh.records import JOINT, JOINT_NAMES, PART
+from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART
 from fig2mesh.training.samples.texture_data import Drawings
 
 SIZE = 64

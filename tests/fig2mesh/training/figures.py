@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.records import JOINT_NAMES, PART
+from fig2mesh.skeleton import JOINT_NAMES, PART
 from fig2mesh.training.bodies.anny_body import AnnyBodies, face_parts, rest_directions
 from fig2mesh.training.bodies.garments import Garment
 from fig2mesh.training.bodies.pack import Character, Pack

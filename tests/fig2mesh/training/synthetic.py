@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from fig2mesh.field.camera import axes
-from fig2mesh.records import BODY_PARTS, JOINT_NAMES
-from fig2mesh.skeleton import KINDS, PART_KIND, anchor_joints, part_centre
+from fig2mesh.skeleton import BODY_PARTS, JOINT_NAMES, KINDS, PART_KIND, anchor_joints, part_centre
 
 RADIUS = dict(zip(KINDS, (0.18, 0.11, 0.05, 0.04, 0.04, 0.07, 0.055, 0.045), strict=True))
 # fmt: off

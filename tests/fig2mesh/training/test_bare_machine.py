@@ -25,12 +25,14 @@ sys.meta_path.insert(0, Bare())
 from pathlib import Path
 import numpy as np
 from fig2mesh.nets.disn import DisnShape
-from fig2mesh.training.samples.build import build
-from fig2mesh.training.networks.train_parts import train_parts
+from fig2mesh.training.samples.build import Wanted, build
+from fig2mesh.training.networks.schedule import Schedule
+from fig2mesh.training.networks.train_parts import PartSampling, train_parts
 
 folder = Path(sys.argv[1])
-build(folder / "pack.npz", folder / "data", bodies=1, valid=0)
-scores = train_parts(folder / "data", "hand", DisnShape("hand"), folder / "run", epochs=1, batch=4, points=64)
+build(folder / "pack.npz", folder / "data", Wanted(bodies=1, valid=0))
+shape, few = DisnShape("hand"), PartSampling(points=64)
+scores = train_parts(folder / "data", "hand", shape, folder / "run", Schedule(batch=4), few, epochs=1)
 assert np.isfinite(scores["loss"]), scores
 assert not BLOCKED & {name.split(".")[0] for name in sys.modules}
 print("done")

@@ -11,7 +11,8 @@ import pytest
 from fig2mesh.field.analytic import MANNEQUIN, mannequin
 from fig2mesh.field.body import Body
 from fig2mesh.image_frame import ImageFrame
-from fig2mesh.records import JOINT, PART, Pose3D
+from fig2mesh.records import Pose3D
+from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.texture.pen import Pen
 from fig2mesh.texture.sources import Sources
 from fig2mesh.view.page import view_page

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from fig2mesh.errors import InputError
 from fig2mesh.mesh.topology import check_solid, face_components
-from fig2mesh.records import BODY_PARTS, JOINT, PART, Mesh
-from fig2mesh.training.bodies.characters import BONES, HEIGHT, one_region_each, read_character
+from fig2mesh.records import Mesh
+from fig2mesh.skeleton import BODY_PARTS, FIGURE_HEIGHT, JOINT, PART
+from fig2mesh.training.bodies.character_file import BONES
+from fig2mesh.training.bodies.characters import one_region_each, read_character
 from fig2mesh.training.bodies.rig import KEY, KEYS, T_POSE, Rig, bone_rotations, pose
 from fig2mesh.training.bodies.solidify import Winding, solidify
 
@@ -173,7 +175,7 @@ def _check_rig(rig: Rig) -> None:
     report = check_solid(Mesh(rig.vertices, rig.faces))
     assert report.solid
     assert report.components == 1
-    assert np.ptp(rig.vertices[:, 1]) == pytest.approx(HEIGHT, abs=0.03)
+    assert np.ptp(rig.vertices[:, 1]) == pytest.approx(FIGURE_HEIGHT, abs=0.03)
     np.testing.assert_allclose(rig.bone_weight.sum(axis=1), 1, atol=1e-5)
     assert rig.face_material.max() < len(rig.materials)
     for part in BODY_PARTS:

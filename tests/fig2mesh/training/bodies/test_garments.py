@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.bodies.garments import Garment, read_garments, vertex_normals, wear
 from tests.fig2mesh.training.figures import bodies, vertex_part, wardrobe
 

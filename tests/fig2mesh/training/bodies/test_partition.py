@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from fig2mesh.records import BODY_PARTS, PART
+from fig2mesh.skeleton import BODY_PARTS, PART
 from fig2mesh.training.bodies.partition import partition
 from fig2mesh.training.bodies.rig import pose
 from tests.fig2mesh.training.figures import capsule_man, poses

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fig2mesh.records import JOINT
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from fig2mesh.training.bodies.rig import KEY, KEY_MIRROR, KEYS, T_POSE, PoseSet, axis_angle, pose, swing
 from tests.fig2mesh.training.figures import NAMES, capsule_man, poses
 

@@ -8,12 +8,11 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from fig2mesh.records import JOINT
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT
 from fig2mesh.training.bodies import subject as subject_module
 from fig2mesh.training.bodies.caricature import Proportions, caricature, draw_proportions
 from fig2mesh.training.bodies.rig import Rig
 from fig2mesh.training.bodies.subject import SPLITS, Subject, draw_subject
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 from tests.fig2mesh.training.figures import NAMES, capsule_man, capsule_pack
 
 SEEN = {"Ann", "coat", "shoes"}

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fig2mesh.records import JOINT, PART
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
+from fig2mesh.training.drawing.crop import ALLOWED, Crop, cut, seen_joints
 from fig2mesh.training.drawing.doodles import MANNERS, doodle, stance
 from fig2mesh.training.drawing.draw import Layers
 from fig2mesh.training.drawing.thing_shapes import Thing
 from fig2mesh.training.drawing.worn import put_on
 from fig2mesh.training.samples.crop_data import Crops
-from fig2mesh.training.samples.crop_views import MIRRORED, Viewer
-from fig2mesh.training.samples.crops import ALLOWED, Crop, cut, seen_joints
+from fig2mesh.training.samples.crop_views import OTHER_SIDE, Viewer
 
 
 def some(count: int, seed: int = 0) -> list[Crop]:
@@ -118,5 +117,5 @@ def test_views_follow_the_generator(viewer: Viewer) -> None:
 
 
 def test_mirrors_are_their_own_inverse() -> None:
-    assert np.array_equal(MIRRORED[MIRRORED], np.arange(18))
+    assert np.array_equal(OTHER_SIDE[OTHER_SIDE], np.arange(18))
     assert [JOINT_MIRROR[other] for other in JOINT_MIRROR] == list(range(21))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fig2mesh.records import PART
+from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.background import BACKGROUNDS, draw_background
 from fig2mesh.training.drawing.draw import Layers, contours, draw, ink
 from fig2mesh.training.drawing.faces import Face

@@ -8,7 +8,8 @@ import pytest
 from fig2mesh.field.analytic import ellipsoid, sample
 from fig2mesh.field.body import Body
 from fig2mesh.mesh.isosurface import isosurface
-from fig2mesh.records import PART, Figure, PartSdf
+from fig2mesh.records import Figure, PartSdf
+from fig2mesh.skeleton import PART
 from fig2mesh.training.evaluate.assembled import Truth, likeness, part_ious
 from fig2mesh.training.evaluate.networks import table
 

@@ -12,7 +12,8 @@ import torch
 from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
-from fig2mesh.training.networks.loop import Result, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded
+from fig2mesh.training.networks.schedule import Schedule
 
 
 class Stop(Exception):
@@ -40,17 +41,12 @@ def train(folder: Path, stop_at: int | None = None, **changed: Any) -> tuple[nn.
         points = torch.eye(3)
         return {"loss": float((model(points)[:, 0] - 1).square().mean())}
 
-    arguments: dict[str, Any] = {
-        "steps": 60,
-        "seed": 7,
-        "batch": 32,
-        "warmup": 5,
-        "validations": 2,
-        "checkpoint_s": 0.0,
-    }
-    arguments |= changed
+    clock = {name: changed.pop(name) for name in ("clock",) if name in changed}
+    regime = Regime(warmup=5, validations=changed.pop("validations", 2), checkpoint_s=0.0)
     optimizer = torch.optim.Adam(model.parameters(), 1e-2)
-    return model, run_loop(model=model, optimizer=optimizer, step=step, validate=validate, folder=folder, **arguments)
+    task = Task(model, optimizer, step, validate, batch=32, arguments=changed.pop("arguments", {}))
+    schedule = Schedule(**{"steps": 60, "seed": 7, "batch": 32, **changed})
+    return model, run_loop(task, folder, schedule, regime, **clock)
 
 
 def same(first: nn.Module, second: nn.Module) -> bool:

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from fig2mesh.errors import FigureError
-from fig2mesh.nets.head_hsv import HeadShape, head_path, read_head
-from fig2mesh.nets.texture_fill import fill_path, read_fill
-from fig2mesh.nets.uv_unet import UvUnetShape, read_uv, uv_path
-from fig2mesh.nets.view_refine import read_refine, refine_path
-from fig2mesh.records import PART
+from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadShape
+from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
+from fig2mesh.nets.uv_unet import UV_WEIGHTS, UvUnetShape
+from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape
+from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_fill import train_fill
 from fig2mesh.training.networks.train_refine import train_head, train_refine
 from fig2mesh.training.networks.train_uv import train_uv
@@ -84,9 +85,9 @@ def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: 
     errors = {}
     for masks in (True, False):
         shape = UvUnetShape(masks, filters=8)
-        found = train_uv(data, tmp_path / str(masks), shape=shape, steps=140, rate=5e-3)
+        found = train_uv(data, tmp_path / str(masks), Schedule(steps=140, rate=5e-3), shape)
         errors[masks] = found["valid-clips_mae"]
-        net, facts = read_uv(uv_path(shape, tmp_path / str(masks)))
+        net, facts = UV_WEIGHTS.read(UV_WEIGHTS.path(shape, tmp_path / str(masks)))
         assert net.shape == shape
         assert facts["scores"] == found
     # The mean of all is off by a quarter.
@@ -96,14 +97,14 @@ def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: 
 
 def test_networks_of_unseen_sides_learn_one_after_the_other(data: Path, tmp_path: Path) -> None:
     """Coordinates cannot find the colour of the back in the front; the refining networks can learn it."""
-    found = train_fill(data, tmp_path, steps=20)
+    found = train_fill(data, tmp_path, Schedule(steps=20))
     assert found["valid-clips_psnr"] > found["valid-clips_front_psnr"] - 0.1
-    net, facts = read_fill(fill_path(tmp_path))
+    net, facts = FILL_WEIGHTS.read(FILL_WEIGHTS.path(FillShape(), tmp_path))
     assert net.shape.size == 128
     assert facts["bodies"] == 12
-    found = train_refine(data, tmp_path, tmp_path / "refine", steps=150, filters=8)
+    found = train_refine(data, tmp_path, tmp_path / "refine", Schedule(steps=150), filters=8)
     assert found["valid-clips_mae"] < 0.9 * found["valid-clips_painted_mae"]
-    assert read_refine(refine_path(tmp_path / "refine"))[1]["scores"] == found
-    found = train_head(data, tmp_path, tmp_path / "head", steps=10, batch=4, shape=HeadShape(4, 8))
+    assert REFINE_WEIGHTS.read(REFINE_WEIGHTS.path(RefineShape(), tmp_path / "refine"))[1]["scores"] == found
+    found = train_head(data, tmp_path, tmp_path / "head", Schedule(steps=10, batch=4), shape=HeadShape(4, 8))
     assert 0 < found["valid-clips_mae"] < 1
-    assert read_head(head_path(tmp_path / "head"))[1]["scores"] == found
+    assert HEAD_WEIGHTS.read(HEAD_WEIGHTS.path(HeadShape(), tmp_path / "head"))[1]["scores"] == found

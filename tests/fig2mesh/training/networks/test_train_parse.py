@@ -10,8 +10,9 @@ import pytest
 import torch
 
 from fig2mesh.errors import FigureError
-from fig2mesh.nets.figure_parser import HEAT, LABELS, MASK, Parsed, parser_path, read_parser
+from fig2mesh.nets.figure_parser import HEAT, LABELS, MASK, PARSER_WEIGHTS, SHIPPED, Parsed
 from fig2mesh.training.drawing.doodles import doodle, stance
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_parse import collate, heat_targets, losses, peaks, sides_right, train_parse
 from fig2mesh.training.samples.crop_data import FIELDS, RECIPE, load_crops
 from fig2mesh.training.samples.crop_views import View
@@ -86,8 +87,8 @@ def test_no_crops_is_said_in_one_line(tmp_path: Path) -> None:
 def test_a_short_run_writes_weights_and_scores(data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # As many as there are doodles: none is scored twice.
     monkeypatch.setattr("fig2mesh.training.networks.train_parse.VIEWS", 6)
-    scores = train_parse(data, data / "run", steps=2, batch=2)
-    _, facts = read_parser(parser_path(data / "run"))
+    scores = train_parse(data, data / "run", Schedule(steps=2, batch=2))
+    _, facts = PARSER_WEIGHTS.read(PARSER_WEIGHTS.path(SHIPPED, data / "run"))
     assert facts["steps"] == 2
     assert facts["crops"] == len(load_crops(data, "train"))
     assert set(scores) == {"iou", "part_iou", "pck05", "pck10", "sides", "seen"}

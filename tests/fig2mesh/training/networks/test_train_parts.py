@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,14 +9,14 @@ import torch
 
 from fig2mesh.errors import InputError
 from fig2mesh.field.camera import axes
-from fig2mesh.nets import weights
-from fig2mesh.nets.disn import Disn, DisnShape
+from fig2mesh.nets.disn import PART_WEIGHTS, Disn, DisnShape
 from fig2mesh.skeleton import KINDS
-from fig2mesh.training.networks.train_parts import draw, evaluate_parts, train_parts
+from fig2mesh.training.networks.schedule import Schedule
+from fig2mesh.training.networks.train_parts import PartSampling, draw, evaluate_parts, train_parts
 from fig2mesh.training.samples.part_data import load_parts, mirrored_masks, swapped, turned, turned_grid
 from tests.fig2mesh.training.synthetic import capsule, write_shard
 
-SHORT = {"epochs": 1, "batch": 4, "points": 64, "validation_bodies": 1}
+FEW = PartSampling(points=64, validation_bodies=1)
 
 
 @pytest.fixture(scope="module")
@@ -91,11 +92,13 @@ def test_a_batch_is_half_inside(data):
 @pytest.mark.parametrize("variant", ["one-stream", "two-stream-pose"])
 def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
     shape = DisnShape.of("hand", variant)
-    scores = [train_parts(data, "hand", shape, tmp_path / name, seed=5, **SHORT) for name in "ab"]
-    files = [weights.disn_path(shape, tmp_path / name).read_bytes() for name in "ab"]
+    scores = [
+        train_parts(data, "hand", shape, tmp_path / name, Schedule(seed=5, batch=4), FEW, epochs=1) for name in "ab"
+    ]
+    files = [PART_WEIGHTS.path(shape, tmp_path / name).read_bytes() for name in "ab"]
     assert files[0] == files[1]
     assert scores[0]["iou_visible"] == scores[1]["iou_visible"]
-    net, facts = weights.read_disn(weights.disn_path(shape, tmp_path / "a"))
+    net, facts = PART_WEIGHTS.read(PART_WEIGHTS.path(shape, tmp_path / "a"))
     assert facts["steps"] == 6
     assert facts["scores"]["n_amodal"] == 2
     assert net.shape == shape
@@ -104,7 +107,7 @@ def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
 
 def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
     shape = DisnShape("foot")
-    train_parts(data, "foot", shape, tmp_path / "whole", **SHORT)
+    train_parts(data, "foot", shape, tmp_path / "whole", Schedule(batch=4), FEW, epochs=1)
 
     class Interrupt(Exception):
         pass
@@ -121,13 +124,17 @@ def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
         return draw(*args)
 
     original = loop.run_loop
-    monkeypatch.setattr(module, "run_loop", lambda **kwargs: original(**kwargs, checkpoint_s=0))
+
+    def at_every_step(task, folder, schedule, regime):
+        return original(task, folder, schedule, replace(regime, checkpoint_s=0))
+
+    monkeypatch.setattr(module, "run_loop", at_every_step)
     monkeypatch.setattr(module, "draw", interrupted)
     with pytest.raises(Interrupt):
-        train_parts(data, "foot", shape, tmp_path / "parts", **SHORT)
+        train_parts(data, "foot", shape, tmp_path / "parts", Schedule(batch=4), FEW, epochs=1)
     monkeypatch.setattr(module, "draw", draw)
-    train_parts(data, "foot", shape, tmp_path / "parts", **SHORT)
-    name = weights.disn_path(shape).name
+    train_parts(data, "foot", shape, tmp_path / "parts", Schedule(batch=4), FEW, epochs=1)
+    name = PART_WEIGHTS.path(shape).name
     assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
@@ -135,7 +142,8 @@ def test_a_network_learns_capsules_of_bodies_that_it_has_not_seen(tmp_path):
     write_shard(tmp_path / "train-00000.npz", 12, 0)
     write_shard(tmp_path / "valid-clips-00000.npz", 1, 2, grids=True)
     shape = DisnShape("lower_arm")
-    result = train_parts(tmp_path, "lower_arm", shape, tmp_path / "out", epochs=20, batch=8, points=128, ema=0.9)
+    given = Schedule(batch=8), PartSampling(points=128)
+    result = train_parts(tmp_path, "lower_arm", shape, tmp_path / "out", *given, epochs=20, ema=0.9)
     assert result["iou_amodal"] > 0.7  # the mean of all fields, the best that knows nothing of its input: 0.31
 
 

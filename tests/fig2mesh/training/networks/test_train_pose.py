@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import torch
 
-from fig2mesh.nets.pose_lift import PoseLiftShape, lift_joints, pose_path, read_pose
-from fig2mesh.records import JOINT, JOINT_NAMES
+from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLiftShape, lift_joints
+from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_NAMES
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, PoseSet, Rig, axis_angle, pose
 from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sampler, Skeletons
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
+from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_pose import pose_scores, train_pose
 
 # fmt: off
@@ -158,13 +158,12 @@ def test_perspective_enlarges_what_is_near(skeletons: Skeletons) -> None:
 )
 def test_training_learns_and_is_stored(skeletons: Skeletons, tmp_path: Path, shape: PoseLiftShape) -> None:
     held = Skeletons.from_rigs([rig(0.95)], poses(16, seed=1))
-    arguments = {"shape": shape, "batch": 64, "seed": 3}
-    _, before = train_pose(skeletons, held, tmp_path / "a", steps=1, **arguments)  # type: ignore[arg-type]
-    net, after = train_pose(skeletons, held, tmp_path / "b", steps=300, **arguments)  # type: ignore[arg-type]
+    _, before = train_pose(skeletons, held, tmp_path / "a", Schedule(steps=1, batch=64, seed=3), shape=shape)
+    net, after = train_pose(skeletons, held, tmp_path / "b", Schedule(steps=300, batch=64, seed=3), shape=shape)
     assert after["sides_rmse_mm"] < 0.8 * before["sides_rmse_mm"]
     assert after["sides_pck150"] > before["sides_pck150"]
     assert json.loads((tmp_path / "b" / "scores.json").read_text()) == after
-    stored, facts = read_pose(pose_path(shape, tmp_path / "b"))
+    stored, facts = POSE_WEIGHTS.read(POSE_WEIGHTS.path(shape, tmp_path / "b"))
     assert facts["scores"] == after
     view = replace(AROUND, perspective=shape.perspective)
     sample = Sampler(held).draw(256, view, torch.Generator().manual_seed(9))
@@ -173,7 +172,7 @@ def test_training_learns_and_is_stored(skeletons: Skeletons, tmp_path: Path, sha
 
 
 def test_scores_of_the_truth_and_of_a_flat_figure(skeletons: Skeletons, tmp_path: Path) -> None:
-    net, _ = train_pose(skeletons, skeletons, tmp_path, shape=PoseLiftShape(width=64), steps=1, batch=8)
+    net, _ = train_pose(skeletons, skeletons, tmp_path, Schedule(steps=1, batch=8), shape=PoseLiftShape(width=64))
     torch.nn.init.zeros_(net.last.weight)
     torch.nn.init.zeros_(net.last.bias)
     sample = Sampler(skeletons).draw(128, AROUND, torch.Generator().manual_seed(0))
@@ -188,8 +187,10 @@ def test_scores_of_the_truth_and_of_a_flat_figure(skeletons: Skeletons, tmp_path
 
 def test_same_seed_same_network(skeletons: Skeletons, tmp_path: Path) -> None:
     shape = PoseLiftShape(width=32)
-    nets = [train_pose(skeletons, skeletons, tmp_path / name, shape=shape, steps=20, batch=16)[0] for name in "ab"]
+    nets = [
+        train_pose(skeletons, skeletons, tmp_path / name, Schedule(steps=20, batch=16), shape=shape)[0] for name in "ab"
+    ]
     for one, other in zip(nets[0].state_dict().values(), nets[1].state_dict().values(), strict=True):
         assert torch.equal(one, other)
-    files = [pose_path(shape, tmp_path / name).read_bytes() for name in "ab"]
+    files = [POSE_WEIGHTS.path(shape, tmp_path / name).read_bytes() for name in "ab"]
     assert files[0] == files[1]

@@ -10,7 +10,7 @@ from PIL import Image
 
 from fig2mesh.errors import InputError
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
-from fig2mesh.records import BODY_PARTS, PART
+from fig2mesh.skeleton import BODY_PARTS, PART
 from fig2mesh.training.drawing.raster import coverage, rasterise
 from fig2mesh.training.samples.contact_sheet import REACH, SHOWN, TILE, compose, make_sheet
 from tests.fig2mesh.training.demo_body import MATERIALS, body, look

@@ -11,12 +11,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, binary_fill_holes, map_coordinates
 
-from fig2mesh.records import BODY_PARTS
-from fig2mesh.skeleton import anchor_joints, part_centre
+from fig2mesh.skeleton import BODY_PARTS, anchor_joints, part_centre
 from fig2mesh.training.bodies.partition import partition
 from fig2mesh.training.bodies.subject import Subject, draw_subject
+from fig2mesh.training.drawing.scene import VIEWS
 from fig2mesh.training.samples import sample as samples
-from fig2mesh.training.samples.sample import MASK, POINTS, VIEWS, geometry
+from fig2mesh.training.samples.sample import MASK, POINTS, geometry
 from fig2mesh.training.samples.sdf import signed_distance, signed_distance_torch
 from tests.fig2mesh.training.figures import capsule_pack
 

@@ -24,11 +24,11 @@ from fig2mesh.mesh.simplify import deviation
 from fig2mesh.mesh.simplify import simplify as simplify_mesh
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import Settings
+from fig2mesh.skeleton import FIGURE_HEIGHT
 from fig2mesh.stages.lift import lift
 from fig2mesh.stages.model import model
 from fig2mesh.stages.simplify import simplify
 from fig2mesh.stages.solid import solid
-from fig2mesh.training.evaluate.paper import FIGURE_HEIGHT
 
 LEVELS = 3
 COARSE = 5000

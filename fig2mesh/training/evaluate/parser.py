@@ -15,8 +15,8 @@ from fig2mesh.errors import InputError
 from fig2mesh.parse.infer import Inference, infer_figure
 from fig2mesh.parse.keypoints import read_keypoints
 from fig2mesh.parse.picture import read_mask, read_view
-from fig2mesh.records import JOINT, BoolArray, ByteArray
-from fig2mesh.skeleton import JOINT_MIRROR
+from fig2mesh.records import BoolArray, ByteArray
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 
 GROUNDS: Final = ("white", "hidden", "map")
 """What is behind a transparent picture: white paper; whatever colours the file hides there; a made-up map."""

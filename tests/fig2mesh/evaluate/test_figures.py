@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from fig2mesh.commands.main import main
-from fig2mesh.measure.figures import COLUMNS, Row, as_json, as_markdown, find_drawings, summary
+from fig2mesh.evaluate.figures import COLUMNS, Row, as_json, as_markdown, find_drawings, summary
 from tests.drawn import write_figure
 
 
