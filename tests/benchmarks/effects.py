@@ -1,7 +1,7 @@
 """What each effect costs, as a share of a plain frame: `python -m tests.benchmarks.effects docs/effects.md`.
 
-Each effect is timed in turn with the plain frame, and the median of the pairs' ratios is told: machines are noisy, but
-both halves of a pair run within a second.
+Each effect is timed in turn with the plain frame, in processor time, and the median of the pairs' ratios is written:
+machines are noisy, but both halves of a pair run within a second.
 """
 
 from __future__ import annotations
@@ -87,16 +87,18 @@ def ratio(job: Callable[[], object], plain: Callable[[], object]) -> float:
 
 
 def seconds(job: Callable[[], object]) -> float:
-    start = time.perf_counter()
+    """Of all cores together."""
+    start = time.process_time()
     job()
-    return time.perf_counter() - start
+    return time.process_time() - start
 
 
 HEAD = f"""# What effects cost
 
 `fig2mesh render` of the shipped farmer through its part fields, {SIZE[0]} × {SIZE[1]} pixels, one ray each, seen from
-the front. A plain frame is `--mode depth` without effects: rays and where they end. Median of {PAIRS} ratios, each of
-two frames made one after the other; made by `python -m tests.benchmarks.effects docs/effects.md`.
+the front. A plain frame is `--mode depth` without effects: rays and where they end. Median of {PAIRS} ratios of
+processor times, each of two frames made one after the other; made by
+`OMP_NUM_THREADS=1 python -m tests.benchmarks.effects docs/effects.md`.
 
 """
 

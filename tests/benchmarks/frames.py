@@ -37,18 +37,16 @@ SPACING = 0.01
 WANTS = {
     "depth": {},
     "normals": {"with_normals": True},
-    "all": {"with_parts": True, "with_normals": True},
 }
 
 
 INTRODUCTION = """\
 Written by `python -m tests.benchmarks.frames`. Medians over a turntable of {views} orthographic views, best of
 {runs} runs each; the figure's height fills the frame, close-ups show {close:.0%} of it. Frames are the geometry that
-`fig2mesh render` colours and lights, which [effects.md](effects.md) measures: all have depth, *normals* adds those,
-*all* the parts too. *Embree* is Open3D's `RaycastingScene` with the same rays on the isosurface of the same field, in
-turn with ours; the ratio is ours over Embree's, median of pairs. The isosurface's grid has nodes {spacing} units apart,
-less where limbs are thin. *Processor ms* is the time of all cores together, which other work on the machine changes
-less.
+`fig2mesh render` colours and lights, which [effects.md](effects.md) measures: all have depth, *normals* adds those.
+*Embree* is Open3D's `RaycastingScene` with the same rays on the isosurface of the same field, in turn with ours; the
+ratio is ours over Embree's, median of pairs. The isosurface's grid has nodes {spacing} units apart, less where limbs
+are thin.
 """
 
 
@@ -89,7 +87,7 @@ def measure(subject: Subject, size: int, close: bool = False, views: int = VIEWS
 
     scene = _scene(subject)
     times: dict[str, list[float]] = {name: [] for name in (*WANTS, "embree")}
-    counts, shares, spent = [], [], []
+    counts, shares = [], []
     for yaw in np.arange(views) * (360.0 / views):
         centre, height = framing(subject.body.bounds(), (size, size), yaw, margin=MARGIN)
         camera = Camera(yaw, size=(size, size), height=height * (CLOSE if close else 1.0), centre=centre)
@@ -98,20 +96,14 @@ def measure(subject: Subject, size: int, close: bool = False, views: int = VIEWS
         frame = None
         for name, want in WANTS.items():
             take = partial(render_frame, subject.body, camera, **want)
-            busy = time.process_time()
             seconds, frame = _timed(take)
             times[name].append(seconds)
-            if name == "all":
-                spent.append((time.process_time() - busy) / RUNS)
         times["embree"].append(_timed(partial(scene.cast_rays, packed))[0])
         counts.append(frame.cells / max(frame.rays, 1))
         shares.append(np.isfinite(frame.depth).mean())
     result = {name: statistics.median(some) for name, some in times.items()}
-    for name in ("depth", "normals"):
-        pairs = zip(times[name], times["embree"], strict=True)
-        result[f"ratio_{name}"] = statistics.median(a / b for a, b in pairs)
+    result["ratio"] = statistics.median(a / b for a, b in zip(times["normals"], times["embree"], strict=True))
     result["cells"] = statistics.mean(counts)
-    result["processor"] = statistics.median(spent)
     result["filled"] = float(np.mean(shares))
     return result
 
@@ -144,14 +136,14 @@ def _timed(job: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def first_use() -> tuple[float, float]:
-    """Seconds until the first frame in a fresh process: kernels compiled, and kernels from disk."""
+    """Processor seconds until the first frame in a fresh process: kernels compiled, and kernels from disk."""
     import tempfile
 
     script = (
         "import time; from tests.benchmarks.frames import quick; "
-        "body, camera = quick(); start = time.perf_counter(); "
+        "body, camera = quick(); start = time.process_time(); "
         "from fig2mesh.render.frame import render_frame; "
-        "render_frame(body, camera, with_parts=True, with_normals=True); print(time.perf_counter() - start)"
+        "render_frame(body, camera, with_parts=True, with_normals=True); print(time.process_time() - start)"
     )
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
@@ -198,9 +190,8 @@ def report(views: int) -> str:
         INTRODUCTION.format(views=views, runs=RUNS, close=CLOSE, spacing=SPACING),
         f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, Python {platform.python_version()}.",
         "",
-        "| figure | size | filled | depth /s | normals /s | all /s | Embree /s | depth : Embree | normals : Embree "
-        "| all, processor ms | cells a ray |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
+        "| figure | size | filled | depth /s | normals /s | Embree /s | normals : Embree | cells a ray |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     per_size: dict[tuple[int, bool], list[dict[str, float]]] = {}
     for close in (False, True):
@@ -226,7 +217,7 @@ def report(views: int) -> str:
     cold, warm = first_use()
     lines += [
         "",
-        f"First frame of a process: {cold:.1f} s while kernels are compiled, {warm:.1f} s from then on.",
+        f"First frame of a process: {cold:.1f} processor seconds while kernels are compiled, {warm:.1f} from then on.",
     ]
     load.append(os.getloadavg()[0])
     lines += [f"Load of the machine on the way: {', '.join(f'{one:.1f}' for one in load)}; ours alone makes at most 2."]
@@ -234,12 +225,8 @@ def report(views: int) -> str:
 
 
 def _row(label: str, size: int, found: dict[str, float]) -> str:
-    rates = " | ".join(f"{1 / found[name]:.0f}" for name in ("depth", "normals", "all", "embree"))
-    ratios = " | ".join(f"{found[f'ratio_{name}']:.2f}" for name in ("depth", "normals"))
-    return (
-        f"| {label} | {size}² | {found['filled']:.0%} | {rates} | {ratios} | {1e3 * found['processor']:.1f} "
-        f"| {found['cells']:.1f} |"
-    )
+    rates = " | ".join(f"{1 / found[name]:.0f}" for name in ("depth", "normals", "embree"))
+    return f"| {label} | {size}² | {found['filled']:.0%} | {rates} | {found['ratio']:.2f} | {found['cells']:.1f} |"
 
 
 if __name__ == "__main__":
