@@ -241,7 +241,7 @@ def _facts(source: Path, output: str, request: Request, scene: Scene, total: _To
         "size": list(request.size),
         "samples": request.samples,
         "pictures": total.pictures,
-        "height_shown": view.height * scene.unit,
+        "height_shown": view.camera.height * scene.unit,
         "depth": {"white_at": view.near * scene.unit, "black_at": view.far * scene.unit},
         "needs": asdict(needs(request.mode, request.effects, fields=isinstance(scene, FieldScene))),
         "counts": asdict(total.counts),
