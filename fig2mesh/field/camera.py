@@ -1,4 +1,4 @@
-"""Rays of orthographic and perspective cameras (paper §4.3, §4.5), and images of what they meet.
+"""Orthographic and perspective cameras (paper §4.3, §4.5), their rays, and images of what these meet.
 
 Yaw turns the camera about the figure: 0 sees the front (camera at +z), 90 the figure's left side (camera at +x),
 180 the back, 270 the right side. Pitch lifts it: 90 looks straight down. Pixel centres lie at +0.5, row 0 on top.
@@ -6,6 +6,7 @@ Yaw turns the camera about the figure: 0 sees the front (camera at +z), 90 the f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,93 @@ class Images(NamedTuple):
     depth: FloatArray
     part_index: IntArray
     normals: FloatArray
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera as numbers; its rays are those of `orthographic` or `perspective`.
+
+    size : (width, height) in pixels; pixels are square
+    height : what the picture shows from top to bottom in the plane through `centre`, FIGURE units
+    centre : (3,) FIGURE, shown in the middle of the picture
+    distance : from `centre` back to the plane where rays start (orthographic), or to the eye (perspective)
+    perspective : whether rays start at one point
+    """
+
+    yaw_deg: float
+    pitch_deg: float = 0.0
+    size: tuple[int, int] = (512, 512)
+    height: float = 2.0
+    centre: Any = (0.0, 0.0, 0.0)
+    distance: float = 10.0
+    perspective: bool = False
+
+    def __post_init__(self) -> None:
+        centre = tuple(float(c) for c in self.centre)
+        object.__setattr__(self, "centre", centre)
+        if min(self.size) < 1 or not self.height > 0:
+            raise ValueError(f"camera: size {self.size} and height {self.height}, expected positive numbers")
+        if len(centre) != 3 or not np.isfinite((*centre, self.distance)).all():
+            raise ValueError(f"camera: centre {centre} and distance {self.distance}, expected finite numbers")
+        if self.perspective and not self.distance > 0:
+            raise ValueError(f"camera: distance {self.distance}, expected a positive one in perspective")
+
+    @property
+    def pixel(self) -> float:
+        """Edge of a pixel in the plane through `centre`, FIGURE units."""
+        return self.height / self.size[1]
+
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """(3, 3) right, up and back, see `axes`."""
+        return axes(self.yaw_deg, self.pitch_deg)
+
+    @property
+    def start(self) -> NDArray[np.float64]:
+        """(3,) from where depths count: the eye, or the middle of the plane where rays start."""
+        start: NDArray[np.float64] = np.asarray(self.centre, np.float64) + self.distance * self.axes[2]
+        return start
+
+    def rays(self, rows: tuple[int, int] | None = None) -> Rays:
+        """Rays of all pixels or of the rows from the first to before the last, row by row."""
+        make = perspective if self.perspective else orthographic
+        return make(
+            self.yaw_deg,
+            self.pitch_deg,
+            size=self.size,
+            height=self.height,
+            centre=self.centre,
+            distance=self.distance,
+            rows=rows,
+        )
+
+    def steps(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origin and direction of rays, (3, 3) each: at pixel (0, 0), and what each column and each row adds.
+
+        Directions have length 1 along the camera's axis.
+        """
+        right, up, back = self.axes
+        width, height = self.size
+        left, top = (0.5 - width / 2) * self.pixel, (height / 2 - 0.5) * self.pixel
+        corner, per_column, per_row = left * right + top * up, self.pixel * right, -self.pixel * up
+        nothing = np.zeros(3)
+        if self.perspective:
+            direction = np.stack([corner / self.distance - back, per_column / self.distance, per_row / self.distance])
+            return np.stack([self.start, nothing, nothing]), direction
+        return np.stack([self.start + corner, per_column, per_row]), np.stack([-back, nothing, nothing])
+
+    def lines(self, pixels: NDArray[np.intp], first_row: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Origins and unit directions (N, 3) of the rays of pixels (N,), counted row by row from `first_row`."""
+        rows, columns = np.divmod(pixels, self.size[0])
+        rows += first_row
+        origin, direction = self.steps()
+        varying = direction if self.perspective else origin
+        # Element by element, not as a product of matrices: a ray is the same whatever others are asked for with it.
+        along = varying[0] + columns[:, None] * varying[1] + rows[:, None] * varying[2]
+        if not self.perspective:
+            return along, np.broadcast_to(direction[0], along.shape)
+        directions = along / np.sqrt(np.einsum("nd,nd->n", along, along))[:, None]
+        return np.broadcast_to(origin[0], along.shape), directions
 
 
 def axes(yaw_deg: float, pitch_deg: float = 0.0) -> NDArray[np.float64]:

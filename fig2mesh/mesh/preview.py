@@ -1,7 +1,8 @@
 """Pictures of a finished model: orthographic views of a textured mesh, cast ray by ray.
 
 For demonstrations, contact sheets and measures (`fig2mesh.measure.model`). It looks at the exported triangles and their
-texture, not at the distance field, so it shows what a viewer of the file will show.
+texture, not at the distance field, so it shows what a viewer of the file will show. The rays are those of
+`fig2mesh.mesh.raycast`, as in `fig2mesh.render`; pixels lie on a plane in metres here, so that they can be a drawing's.
 
 Views: yaw 0 looks at the figure's front (camera at +Z of ASSET), yaw 90 at its left side (camera at +X), 180 at its
 back; a positive pitch raises the camera. The plane of a view has two coordinates in metres through the ASSET origin:
@@ -13,7 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from numpy.typing import NDArray
 from exporters.asset import ByteArray, TexturedMesh
 from exporters.sampling import sample
 from fig2mesh.field.camera import axes
+from fig2mesh.mesh.raycast import MeshCaster, MeshHits, interpolated
+from fig2mesh.pixels import straight_bytes
 
 Mode = Literal["textured", "clay", "normals", "observed"]
 Bounds = tuple[float, float, float, float]
@@ -79,29 +82,18 @@ def render_mesh(
     if min(width, height, samples) < 1:
         raise ValueError(f"size and samples are {size} and {samples}, expected at least 1")
     left, bottom, right, top = _fitted(view_bounds(mesh, yaw_deg, pitch_deg), size) if bounds is None else bounds
-    view_from_asset = axes(yaw_deg, pitch_deg)
-    vertices = mesh.vertices @ view_from_asset.T
-    # Centred and of unit size, so that single precision serves figures of a millimetre and of a kilometre alike.
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    centre, unit = (low + high) / 2, max(float((high - low).max()), 1e-30)
-    scene = raycasting_scene((vertices - centre) / unit, mesh.faces)
-    x = ((left + (np.arange(width * samples) + 0.5) / (width * samples) * (right - left)) - centre[0]) / unit
-    y = ((top - (np.arange(height * samples) + 0.5) / (height * samples) * (top - bottom)) - centre[1]) / unit
+    caster, view_from_asset = MeshCaster(mesh), axes(yaw_deg, pitch_deg)
+    centre = view_from_asset @ caster.centre
+    x = ((left + (np.arange(width * samples) + 0.5) / (width * samples) * (right - left)) - centre[0]) / caster.unit
+    y = ((top - (np.arange(height * samples) + 0.5) / (height * samples) * (top - bottom)) - centre[1]) / caster.unit
 
     picture = np.empty((height, width, 4), np.float64)
     rows = max(1, RAYS_AT_ONCE // (width * samples * samples))
     for first in range(0, height, rows):
         band = y[first * samples : (first + rows) * samples]
-        fine = _shade_rays(scene, mesh, view_from_asset, x, band, mode).reshape(-1, samples, width, samples, 4)
+        fine = _shade_rays(caster, view_from_asset, x, band, mode).reshape(-1, samples, width, samples, 4)
         picture[first : first + rows] = fine.mean(axis=(1, 3), dtype=np.float64)
-    coverage = picture[..., 3:]
-    if background is not None:
-        colour = picture[..., :3] + (1 - coverage) * np.array(background, np.float64)
-        coverage = np.ones_like(coverage)
-    else:
-        colour = picture[..., :3] / np.maximum(coverage, 1e-9)
-    rgba = np.concatenate([np.clip(colour, 0, 255), 255 * coverage], axis=2)
-    return np.asarray(np.rint(rgba), dtype=np.uint8)
+    return straight_bytes(picture, background)
 
 
 def views_sheet(
@@ -188,83 +180,45 @@ def _fitted(bounds: Bounds, size: tuple[int, int]) -> Bounds:
     return x - pixel * width / 2, y - pixel * height / 2, x + pixel * width / 2, y + pixel * height / 2
 
 
-def raycasting_scene(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Any:
-    """Open3D's ray caster of a mesh; vertices of about unit size, as it computes in single precision."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    corners = o3d.core.Tensor.from_numpy(np.ascontiguousarray(vertices, np.float32))
-    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
-    return scene
-
-
 def _shade_rays(
-    scene: Any,
-    mesh: TexturedMesh,
+    caster: MeshCaster,
     view_from_asset: NDArray[np.float64],
     x: NDArray[np.float64],
     y: NDArray[np.float64],
     mode: Mode,
 ) -> NDArray[np.float32]:
-    """(len(y), len(x), 4) colour 0-255, zero where nothing is hit, and coverage 0 or 1; scene's coordinates."""
-    import open3d as o3d
-
-    rays = np.zeros((len(y), len(x), 6), np.float32)
-    rays[..., 0], rays[..., 1], rays[..., 2], rays[..., 5] = x, y[:, None], 1.0, -1.0
-    answer = scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
-    hit = np.isfinite(answer["t_hit"].numpy())
-    corners = mesh.faces[answer["primitive_ids"].numpy()[hit]]
-    second, third = answer["primitive_uvs"].numpy()[hit].T
-    weights = np.stack([1 - second - third, second, third], axis=1)
-    result = np.zeros((len(y), len(x), 4), np.float32)
-    if len(corners):
-        result[hit, :3] = _colours(mesh, corners, weights, view_from_asset, mode)
-        result[hit, 3] = 1.0
+    """(len(y), len(x), 4) colour 0-255, zero where nothing is hit, and coverage 0 or 1; x, y in units of the caster."""
+    right, up, back = view_from_asset
+    origins = (x[:, None] * right + (y[:, None, None] * up + back)).astype(np.float32).reshape(-1, 3)
+    hits = caster.cast(origins, np.broadcast_to(-back.astype(np.float32), origins.shape))
+    result = np.zeros((len(origins), 4), np.float32)
+    if len(hits.corners):
+        result[hits.hit, :3] = _colours(caster, hits, view_from_asset, mode)
+        result[hits.hit, 3] = 1.0
     return result
 
 
 def _colours(
-    mesh: TexturedMesh,
-    corners: NDArray[np.int32],
-    weights: NDArray[np.float32],
-    view_from_asset: NDArray[np.float64],
-    mode: Mode,
+    caster: MeshCaster, hits: MeshHits, view_from_asset: NDArray[np.float64], mode: Mode
 ) -> NDArray[np.floating]:
-    """(N, 3) colours 0-255 of points given by their triangles' corners (N, 3) and barycentric weights (N, 3)."""
-
+    """(M, 3) colours 0-255 where the mesh is met."""
     if mode == "textured":
-        colours = mesh_colours(mesh, corners, weights)
+        colours = caster.colours(hits)
         if colours is not None:
             return colours
-    normals = interpolated(mesh.shading_normals, corners, weights) @ view_from_asset.T
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    normals = caster.normals(hits) @ view_from_asset.T
     if mode == "normals":
         return 127.5 * (normals + 1.0)
     # Half-Lambert: no side of the form falls into black.
     light = 0.5 + 0.5 * (normals @ (np.array(KEY_LIGHT) / np.linalg.norm(KEY_LIGHT)))[:, None]
     shade = 0.30 + 0.75 * light**1.5
+    mesh = caster.mesh
     if mode == "observed" and mesh.observed is not None and mesh.uv is not None:
-        share = sample(mesh.observed, interpolated(mesh.uv, corners, weights))[:, :1] / 255.0
+        share = sample(mesh.observed, interpolated(mesh.uv, hits))[:, :1] / 255.0
         base = share * np.array(OBSERVED) + (1 - share) * np.array(INFERRED)
     else:
         base = np.array(CLAY)
     return np.asarray(np.minimum(shade * base, 255.0))
-
-
-def interpolated(values: NDArray[Any], corners: NDArray[np.int32], weights: NDArray[np.float32]) -> NDArray[Any]:
-    """(N, K) what vertices have (V, K), at points given by corners (N, 3) and barycentric weights (N, 3)."""
-    # Corner by corner: one gather of all three would need three times the memory.
-    return np.asarray(sum(weights[:, k, None] * values[corners[:, k]] for k in range(3)))
-
-
-def mesh_colours(
-    mesh: TexturedMesh, corners: NDArray[np.int32], weights: NDArray[np.float32]
-) -> NDArray[np.floating] | None:
-    """(N, 3) sRGB 0-255 of the texture, else of the vertices, at such points; None where the mesh has neither."""
-    if mesh.texture is not None and mesh.uv is not None:
-        texels = sample(mesh.texture, interpolated(mesh.uv, corners, weights))
-        return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
-    return None if mesh.colors is None else interpolated(mesh.colors, corners, weights)
 
 
 def _drawing_cell(

@@ -9,7 +9,8 @@ from dataclasses import dataclass, fields
 class Counts:
     """Numbers of things done, summed over pictures.
 
-    camera_rays : from the camera
+    camera_rays : from the camera, one for each sample of each pixel; those of tiles that cannot see a part field are
+        answered without being traced
     normals : computed at points of the surface
     texture_samples : colours looked up in drawings or textures
     sight_rays : towards the viewer of the drawing

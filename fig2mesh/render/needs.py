@@ -37,6 +37,11 @@ class Needs:
     edges: bool = False
     blend: bool = False
 
+    @property
+    def points(self) -> bool:
+        """Whether its place in space is needed: further rays start there, and ink compares places."""
+        return self.sight or self.shadow or self.ao_samples > 0 or self.edges
+
 
 def needs(mode: Mode, effects: Set[Effect], *, fields: bool = True) -> Needs:
     """The least that shows `mode` with `effects`.

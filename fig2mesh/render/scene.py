@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
 from fig2mesh.field.body import Body
+from fig2mesh.field.camera import Camera
 from fig2mesh.field.trace import trace
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.bake import drawn_colours, plain_colours
-from fig2mesh.mesh.preview import interpolated, mesh_colours, raycasting_scene
+from fig2mesh.mesh.raycast import MeshCaster, MeshHits
 from fig2mesh.records import Rays
 from fig2mesh.render.counts import Counts
+from fig2mesh.render.frame import render_frame
 from fig2mesh.render.needs import Needs
 from fig2mesh.texture.sources import Sources
 
@@ -32,19 +34,18 @@ BLEND_SPAN = 0.5
 
 @dataclass(frozen=True)
 class Surface:
-    """Where N rays meet the surface, at M points.
+    """Where N rays meet the surface, at M points; what was not needed has no rows.
 
     depth : (N,) along the rays; infinite where nothing is met
-    points : (M, 3); normals : (M, 3) unit, or (0, 3); labels : (M,) uint8, or (0,)
-    corners, weights : (M, 3) vertices of the triangles met and barycentric coordinates; None for fields
+    points : (M, 3); normals : (M, 3) unit; labels : (M,) uint8
+    hits : on the triangles of a mesh; None for fields
     """
 
     depth: NDArray[np.float32]
     points: Floats
     normals: Floats
     labels: NDArray[np.uint8]
-    corners: NDArray[np.int32] | None = None
-    weights: NDArray[np.float32] | None = None
+    hits: MeshHits | None = None
 
 
 class Scene(Protocol):
@@ -58,8 +59,8 @@ class Scene(Protocol):
     def unit(self) -> float:
         """Length of a unit of these coordinates in the units of what was given."""
 
-    def meet(self, rays: Rays, needs: Needs) -> Surface:
-        """First meeting of each ray with the surface."""
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+        """First meeting with the surface of each ray of a picture's rows, from the first to before the last."""
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         """(N,) whether the surface is met within `reach`."""
@@ -93,12 +94,20 @@ class FieldScene:
     def unit(self) -> float:
         return 1.0
 
-    def meet(self, rays: Rays, needs: Needs) -> Surface:
-        hits = trace(self.body, rays, with_normals=needs.normals)
-        hit = hits.hit
-        normals = hits.normals[hit] if needs.normals else np.empty((0, 3))
-        labels = self.body.labels[hits.part_index[hit]] if needs.labels else np.empty(0, np.uint8)
-        return Surface(hits.depth, hits.points[hit].astype(np.float64), normals.astype(np.float64), labels)
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+        frame = render_frame(self.body, camera, rows, with_parts=needs.labels, with_normals=needs.normals)
+        depth = frame.depth.reshape(-1)
+        hit = np.flatnonzero(np.isfinite(depth))
+        points, normals, labels = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.uint8)
+        if needs.points:
+            origins, directions = camera.lines(hit, rows[0])
+            points = origins + depth[hit, None] * directions
+        if frame.normals is not None:
+            normals = frame.normals.reshape(-1, 3)[hit].astype(np.float64)
+        if frame.parts is not None:
+            labels = self.body.labels[frame.parts.reshape(-1)[hit]]
+        counts = Counts(camera_rays=len(depth), normals=frame.normals_computed)
+        return Surface(depth, points, normals, labels), counts
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         rays = Rays(origins.astype(np.float32), directions.astype(np.float32))
@@ -128,57 +137,43 @@ class FieldScene:
 
 @dataclass(frozen=True)
 class MeshScene:
-    """A finished mesh, ASSET, moved and scaled to a box of unit size about the origin: single precision then serves
-    figures of a millimetre and of a kilometre alike."""
+    """A finished mesh, ASSET, in coordinates of `MeshCaster`."""
 
     mesh: TexturedMesh
 
     @cached_property
-    def _box(self) -> tuple[Floats, Floats]:
-        vertices = self.mesh.vertices.astype(np.float64)
-        return vertices.min(axis=0), vertices.max(axis=0)
+    def _caster(self) -> MeshCaster:
+        return MeshCaster(self.mesh)
 
     @cached_property
     def bounds(self) -> Floats:
-        low, high = self._box
+        low, high = self._caster.box
         return np.stack([low - high, high - low]) / (2 * self.unit)
 
-    @cached_property
+    @property
     def unit(self) -> float:
-        low, high = self._box
-        return max(float((high - low).max()), 1e-30)
+        return self._caster.unit
 
-    @cached_property
-    def _scene(self) -> Any:
-        low, high = self._box
-        return raycasting_scene((self.mesh.vertices - (low + high) / 2) / self.unit, self.mesh.faces)
-
-    def meet(self, rays: Rays, needs: Needs) -> Surface:
-        answer = self._scene.cast_rays(_packed(rays.origins, rays.directions))
-        depth = answer["t_hit"].numpy()
-        hit = np.isfinite(depth)
-        corners = self.mesh.faces[answer["primitive_ids"].numpy()[hit]]
-        second, third = answer["primitive_uvs"].numpy()[hit].T
-        weights = np.stack([1 - second - third, second, third], axis=1)
-        points = rays.origins[hit].astype(np.float64) + depth[hit, None].astype(np.float64) * rays.directions[hit]
-        normals = np.empty((0, 3))
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+        rays = camera.rays(rows)
+        hits = self._caster.cast(rays.origins, rays.directions)
+        points, normals, labels = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.uint8)
+        if needs.points:
+            points = rays.origins[hits.hit] + hits.depth[hits.hit, None].astype(np.float64) * rays.directions[hits.hit]
         if needs.normals:
-            normals = interpolated(self.mesh.shading_normals, corners, weights).astype(np.float64)
-            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-        labels = np.empty(0, np.uint8)
+            normals = self._caster.normals(hits)
         if needs.labels:
-            nearest = corners[np.arange(len(corners)), weights.argmax(axis=1)]
+            nearest = hits.corners[np.arange(len(hits.corners)), hits.weights.argmax(axis=1)]
             labels = np.zeros(len(nearest), np.uint8) if self.mesh.parts is None else self.mesh.parts[nearest]
-        return Surface(depth, points, normals, labels, corners, weights)
+        counts = Counts(camera_rays=len(hits.depth), normals=len(normals))
+        return Surface(hits.depth, points, normals, labels, hits), counts
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
-        answer = self._scene.test_occlusions(_packed(origins, directions), tnear=0.0, tfar=float(reach))
-        return np.asarray(answer.numpy())
+        return self._caster.blocked(origins, directions, reach)
 
     def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
-        assert surface.corners is not None
-        assert surface.weights is not None
-        found = mesh_colours(self.mesh, surface.corners, surface.weights)
+        assert surface.hits is not None
+        found = self._caster.colours(surface.hits)
         if found is None:
             raise ValueError("mesh: no texture and no colours, expected one of them")
         return found.astype(np.float64), Counts(texture_samples=len(found))
@@ -188,9 +183,3 @@ def smooth_step(share: Floats) -> Floats:
     """0 below 0, 1 above 1, and a cubic between them."""
     inside = np.clip(share, 0.0, 1.0)
     return np.asarray(inside * inside * (3.0 - 2.0 * inside))
-
-
-def _packed(origins: NDArray[Any], directions: NDArray[Any]) -> Any:
-    import open3d as o3d
-
-    return o3d.core.Tensor.from_numpy(np.concatenate([origins, directions], axis=1).astype(np.float32))

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.field.camera import axes, orthographic, perspective
-from fig2mesh.records import Rays
+from fig2mesh.field.camera import Camera, axes
 
 MARGIN = 0.05
 """Free border on each side, share of the picture."""
@@ -25,23 +24,12 @@ GROUND_RADIUS = 0.36
 class View:
     """A camera that turns about the vertical axis through the middle of a figure, which never leaves the picture.
 
-    centre : (3,) looked at; height : shown in the plane through it; distance : of the camera from it
     near, far : distances from the camera's plane between which the figure lies
     """
 
-    centre: tuple[float, float, float]
-    height: float
-    distance: float
+    camera: Camera
     near: float
     far: float
-    perspective: bool
-
-    def rays(self, yaw_deg: float, pitch_deg: float, size: tuple[int, int], rows: tuple[int, int]) -> Rays:
-        """Rays of the picture's rows `rows`."""
-        camera = perspective if self.perspective else orthographic
-        return camera(
-            yaw_deg, pitch_deg, size=size, height=self.height, centre=self.centre, distance=self.distance, rows=rows
-        )
 
 
 def ground_radius(bounds: NDArray[np.float64]) -> float:
@@ -50,8 +38,10 @@ def ground_radius(bounds: NDArray[np.float64]) -> float:
     return float(max(GROUND_RADIUS * 2 * half[1], 1.1 * np.hypot(half[0], half[2])))
 
 
-def make_view(bounds: Any, size: tuple[int, int], pitch_deg: float, *, nearby: bool, ground: bool) -> View:
-    """The camera for a figure in a box (2, 3), for every yaw.
+def make_view(
+    bounds: Any, size: tuple[int, int], yaw_deg: float, pitch_deg: float, *, nearby: bool, ground: bool
+) -> View:
+    """The camera for a figure in a box (2, 3); all but its direction is the same for every yaw.
 
     nearby : perspective; ground : show the disc below it as well
     """
@@ -74,5 +64,5 @@ def make_view(bounds: Any, size: tuple[int, int], pitch_deg: float, *, nearby: b
     width, height = size
     shown = 2 * max(float(np.abs(up).max()), float(np.abs(across).max()) * height / width) / (1 - 2 * MARGIN)
     reach = float(towards.max())
-    x, y, z = box.mean(axis=0).tolist()
-    return View((x, y, z), shown, distance, distance - reach, distance + reach, nearby)
+    camera = Camera(yaw_deg, pitch_deg, size, shown, box.mean(axis=0), distance, nearby)
+    return View(camera, distance - reach, distance + reach)

@@ -35,95 +35,75 @@ RUNS = 3
 SPACING = 0.01
 """Of the isosurface, FIGURE units: what the run benchmark uses."""
 WANTS = {
-    "depth": {"depth"},
-    "normals": {"depth", "normals"},
-    "colour": {"colour"},
-    "all": {"colour", "depth", "normals", "parts"},
+    "depth": {},
+    "normals": {"with_normals": True},
 }
 
 
 INTRODUCTION = """\
 Written by `python -m tests.benchmarks.frames`. Medians over a turntable of {views} orthographic views, best of
-{runs} runs each; the figure's height fills the frame, close-ups show {close:.0%} of it. *Colour* has normals, drawing,
-plain pictures and their blend; *all* adds depth, parts and normals as pictures. *Embree* is Open3D's `RaycastingScene`
-with the same rays on the isosurface of the same field, in turn with ours; the ratio is ours over Embree's, median of
-pairs. The isosurface's grid has nodes {spacing} units apart, less where limbs are thin. *Processor ms* is the time of
-all cores together, which other work on the machine changes less.
+{runs} runs each; the figure's height fills the frame, close-ups show {close:.0%} of it. Frames are the geometry that
+`fig2mesh render` colours and lights, which [effects.md](effects.md) measures: all have depth, *normals* adds those.
+*Embree* is Open3D's `RaycastingScene` with the same rays on the isosurface of the same field, in turn with ours; the
+ratio is ours over Embree's, median of pairs. The isosurface's grid has nodes {spacing} units apart, less where limbs
+are thin.
 """
 
 
 @dataclass(frozen=True)
 class Subject:
-    """body, colours : what frames are made of."""
+    """body : what frames are made of."""
 
     name: str
     body: Any
-    colours: Any
 
 
 def subjects() -> list[Subject]:
-    """The analytic mannequin in made-up colours, and two drawn examples."""
+    """The analytic mannequin, and two drawn examples."""
     from fig2mesh.field.analytic import mannequin
     from fig2mesh.field.body import Body
-    from fig2mesh.image_frame import ImageFrame
-    from fig2mesh.render.surface_colours import surface_colours
-    from fig2mesh.texture.sources import Sources
 
-    body = Body(mannequin(64))
-    rows, columns = np.mgrid[0:1000, 0:1000].astype(np.float32)
-    plain = {part: np.full((500, 500, 3), 16.0 * part, np.float32) for part in range(1, 15)}
-    sources = Sources(np.stack([rows % 255, columns % 255, 128 + 0 * rows], axis=-1), plain, 0.5)
-    colours = surface_colours(body, sources, ImageFrame((500.0, 500.0), 0.002))
-    return [Subject("mannequin", body, colours), drawn("farmer"), drawn("market_woman")]
+    return [Subject("mannequin", Body(mannequin(64))), drawn("farmer"), drawn("market_woman")]
 
 
 def drawn(name: str) -> Subject:
     """An example of the repository at standard quality."""
     from fig2mesh.conversion.convert import run_stages
-    from fig2mesh.image_frame import image_frame
     from fig2mesh.parse.read import read_figure
-    from fig2mesh.render.surface_colours import surface_colours
     from fig2mesh.settings import PRESETS
     from fig2mesh.stages.body import body
-    from fig2mesh.stages.textures import textures
 
     figure = read_figure(FIGURES / name / "image.png", keypoints=FIGURES / name / "keypoints.json")
-    done = run_stages(figure, PRESETS["standard"], (body, textures))
-    colours = surface_colours(done.results[body], done.results[textures], image_frame(done.figure))
-    return Subject(name.replace("_", " "), done.results[body], colours)
+    done = run_stages(figure, PRESETS["standard"], (body,))
+    return Subject(name.replace("_", " "), done.results[body])
 
 
 def measure(subject: Subject, size: int, close: bool = False, views: int = VIEWS) -> dict[str, float]:
     """Median seconds of a frame for each of `WANTS` and Embree, and counts, over the turntable."""
     import open3d as o3d
 
-    from fig2mesh.field.camera import framing
-    from fig2mesh.render.frame import FrameCamera, render_frame
+    from fig2mesh.field.camera import Camera, framing
+    from fig2mesh.render.frame import render_frame
 
     scene = _scene(subject)
     times: dict[str, list[float]] = {name: [] for name in (*WANTS, "embree")}
-    counts, shares, spent = [], [], []
+    counts, shares = [], []
     for yaw in np.arange(views) * (360.0 / views):
         centre, height = framing(subject.body.bounds(), (size, size), yaw, margin=MARGIN)
-        camera = FrameCamera(yaw, size=(size, size), height=height * (CLOSE if close else 1.0), centre=centre)
+        camera = Camera(yaw, size=(size, size), height=height * (CLOSE if close else 1.0), centre=centre)
         rays = camera.rays()
         packed = o3d.core.Tensor.from_numpy(np.concatenate([rays.origins, rays.directions], axis=1))
         frame = None
         for name, want in WANTS.items():
-            take = partial(render_frame, subject.body, camera, colours=subject.colours, want=want)
-            busy = time.process_time()
+            take = partial(render_frame, subject.body, camera, **want)
             seconds, frame = _timed(take)
             times[name].append(seconds)
-            if name == "colour":
-                spent.append((time.process_time() - busy) / RUNS)
         times["embree"].append(_timed(partial(scene.cast_rays, packed))[0])
-        counts.append((frame.counts.cells / max(frame.counts.rays, 1), frame.counts.rays / size**2))
+        counts.append(frame.cells / max(frame.rays, 1))
         shares.append(np.isfinite(frame.depth).mean())
     result = {name: statistics.median(some) for name, some in times.items()}
-    result["ratio"] = statistics.median(a / b for a, b in zip(times["colour"], times["embree"], strict=True))
-    result["ratio_normals"] = statistics.median(a / b for a, b in zip(times["normals"], times["embree"], strict=True))
-    result["cells"] = statistics.mean(cells for cells, _ in counts)
-    result["processor"] = statistics.median(spent)
+    result["ratio"] = statistics.median(a / b for a, b in zip(times["normals"], times["embree"], strict=True))
+    result["cells"] = statistics.mean(counts)
     result["filled"] = float(np.mean(shares))
     return result
 
@@ -156,14 +136,14 @@ def _timed(job: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def first_use() -> tuple[float, float]:
-    """Seconds until the first coloured frame in a fresh process: kernels compiled, and kernels from disk."""
+    """Processor seconds until the first frame in a fresh process: kernels compiled, and kernels from disk."""
     import tempfile
 
     script = (
         "import time; from tests.benchmarks.frames import quick; "
-        "body, colours = quick(); start = time.perf_counter(); "
-        "from fig2mesh.render.frame import FrameCamera, render_frame; "
-        "render_frame(body, FrameCamera(0, size=(64, 64)), colours=colours()); print(time.perf_counter() - start)"
+        "body, camera = quick(); start = time.process_time(); "
+        "from fig2mesh.render.frame import render_frame; "
+        "render_frame(body, camera, with_parts=True, with_normals=True); print(time.process_time() - start)"
     )
     with tempfile.TemporaryDirectory() as folder:
         environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
@@ -176,17 +156,13 @@ def first_use() -> tuple[float, float]:
     return cold, warm
 
 
-def quick() -> tuple[Any, Callable[[], Any]]:
-    """A body, and how its colours are made."""
+def quick() -> tuple[Any, Any]:
+    """A body and a camera."""
     from fig2mesh.field.analytic import mannequin
     from fig2mesh.field.body import Body
-    from fig2mesh.image_frame import ImageFrame
-    from fig2mesh.render.surface_colours import surface_colours
-    from fig2mesh.texture.sources import Sources
+    from fig2mesh.field.camera import Camera
 
-    body = Body(mannequin(32))
-    sources = Sources(np.zeros((50, 50, 3), np.float32), {1: np.zeros((50, 50, 3), np.float32)}, 1.0)
-    return body, lambda: surface_colours(body, sources, ImageFrame((25.0, 25.0), 0.04))
+    return Body(mannequin(32)), Camera(0, size=(64, 64))
 
 
 def preparation(subject: Subject) -> dict[str, float]:
@@ -201,7 +177,6 @@ def preparation(subject: Subject) -> dict[str, float]:
         "seconds": time.perf_counter() - start,
         "grids": sum(array.nbytes for array in body.grids) / 1e6,
         "space": sum(array.nbytes for array in space) / 1e6,
-        "colours": subject.colours.megabytes,
     }
 
 
@@ -215,9 +190,8 @@ def report(views: int) -> str:
         INTRODUCTION.format(views=views, runs=RUNS, close=CLOSE, spacing=SPACING),
         f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, Python {platform.python_version()}.",
         "",
-        "| figure | size | filled | depth /s | normals /s | colour /s | all /s | Embree /s | colour : Embree "
-        "| normals : Embree | colour, processor ms | cells a ray |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "| figure | size | filled | depth /s | normals /s | Embree /s | normals : Embree | cells a ray |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     per_size: dict[tuple[int, bool], list[dict[str, float]]] = {}
     for close in (False, True):
@@ -232,18 +206,18 @@ def report(views: int) -> str:
             keys = per_size[size, close][0]
             median = {key: statistics.median(one[key] for one in per_size[size, close]) for key in keys}
             lines.append(_row(f"**median{', close' if close else ''}**", size, median))
-    lines += ["", "| figure | triangles of the isosurface | preparation s | grids MB | empty space MB | pictures MB |"]
-    lines += ["|---|---|---|---|---|---|"]
+    lines += ["", "| figure | triangles of the isosurface | preparation s | grids MB | empty space MB |"]
+    lines += ["|---|---|---|---|---|"]
     for subject in everything:
         made = preparation(subject)
         lines.append(
             f"| {subject.name} | {_scenes[subject.name][1]:,} | {made['seconds']:.2f} | {made['grids']:.1f} | "
-            f"{made['space']:.1f} | {made['colours']:.1f} |"
+            f"{made['space']:.1f} |"
         )
     cold, warm = first_use()
     lines += [
         "",
-        f"First coloured frame of a process: {cold:.1f} s while kernels are compiled, {warm:.1f} s from then on.",
+        f"First frame of a process: {cold:.1f} processor seconds while kernels are compiled, {warm:.1f} from then on.",
     ]
     load.append(os.getloadavg()[0])
     lines += [f"Load of the machine on the way: {', '.join(f'{one:.1f}' for one in load)}; ours alone makes at most 2."]
@@ -251,11 +225,8 @@ def report(views: int) -> str:
 
 
 def _row(label: str, size: int, found: dict[str, float]) -> str:
-    rates = " | ".join(f"{1 / found[name]:.0f}" for name in ("depth", "normals", "colour", "all", "embree"))
-    return (
-        f"| {label} | {size}² | {found['filled']:.0%} | {rates} | {found['ratio']:.2f} | {found['ratio_normals']:.2f} "
-        f"| {1e3 * found['processor']:.1f} | {found['cells']:.1f} |"
-    )
+    rates = " | ".join(f"{1 / found[name]:.0f}" for name in ("depth", "normals", "embree"))
+    return f"| {label} | {size}² | {found['filled']:.0%} | {rates} | {found['ratio']:.2f} | {found['cells']:.1f} |"
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import pytest
 
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
-from fig2mesh.field.camera import VIEW_YAW_DEG, axes, framing, images, orthographic, perspective
+from fig2mesh.field.camera import VIEW_YAW_DEG, Camera, axes, framing, images, orthographic, perspective
 from fig2mesh.field.trace import trace
 
 from .fields import pair
@@ -106,3 +106,15 @@ def test_wrong_sizes_are_named():
     hits = trace(pair(), orthographic(0, size=(4, 4), height=1))
     with pytest.raises(ValueError, match="16 rays"):
         images(hits, (4, 5))
+
+
+@pytest.mark.parametrize("nearby", [False, True])
+def test_lines_are_rays_in_double_precision(nearby):
+    camera = Camera(33, 21, (7, 5), 1.2, (0.1, 0.2, 0.3), 3.0, nearby)
+    rays = camera.rays()
+    for origins, directions in (camera.lines(np.arange(35)), camera.lines(np.arange(35) - 14, 2)):
+        assert np.allclose(origins, rays.origins, atol=1e-6)
+        assert np.allclose(directions, rays.directions, atol=1e-6)
+    some = camera.rays((2, 4))
+    assert np.array_equal(some.origins, rays.origins[14:28])
+    assert np.array_equal(some.directions, rays.directions[14:28])

@@ -50,7 +50,7 @@ INK = (10, 20, 30)
 
 def ball_normals(request: Request, scene: FieldScene, radius: float) -> NDArray[np.float64]:
     """(H, W, 3) normals of a ball about the origin in an orthographic picture; NaN beside it."""
-    pixel = view_of(scene, request).height / request.size[1]
+    pixel = view_of(scene, request).camera.height / request.size[1]
     offset = (np.arange(SIDE) + 0.5 - SIDE / 2) * pixel / radius
     right, up = offset[None, :], -offset[:, None]
     with np.errstate(invalid="ignore"):
@@ -100,7 +100,7 @@ def test_shadow_of_a_ball_lies_where_geometry_says() -> None:
         "clay", frozenset(["sun", "shadow"]), (SIDE, SIDE), pitch_deg=90.0, ground=True, sun=tuple(sun.tolist())
     )
     picture = render(scene, request).rgba
-    pixel = view_of(scene, request).height / SIDE
+    pixel = view_of(scene, request).camera.height / SIDE
     x = (np.arange(SIDE) + 0.5 - SIDE / 2) * pixel
     points = np.stack([x[None, :] + 0 * x[:, None], np.full((SIDE, SIDE), -radius), x[:, None] + 0 * x[None, :]], -1)
     along = points @ sun
@@ -127,7 +127,7 @@ def test_ambient_occlusion_of_a_plane_is_one_and_of_a_corner_a_half() -> None:
     request = Request("clay", frozenset(["ao"]), size, pitch_deg=90.0)
     bare, shaded = (render(scene, replace(request, effects=effects)).rgba for effects in (frozenset(), request.effects))
     openness = decode(shaded[..., 0].astype(float)) / np.maximum(decode(bare[..., 0].astype(float)), 1e-9)
-    pixel = view_of(scene, request).height / size[1]
+    pixel = view_of(scene, request).camera.height / size[1]
     z = (np.arange(size[1]) + 0.5 - size[1] / 2) * pixel + scene.bounds.mean(axis=0)[2]
     reach = AO_REACH * (scene.bounds[1, 1] - scene.bounds[0, 1])
     # The riser takes the directions that get to it within the reach: all of one half in the corner, none further off.
@@ -155,7 +155,7 @@ def test_depth_of_a_ball_is_its_formula() -> None:
     view = view_of(scene, request)
     picture = render(scene, request).rgba
     towards = 0.5 * (ball_normals(request, scene, 0.5) @ axes(40.0)[2])
-    expected = 255 * (view.far - (view.distance - towards)) / (view.far - view.near)
+    expected = 255 * (view.far - (view.camera.distance - towards)) / (view.far - view.near)
     inside = picture[..., 3] == 255
     assert np.isnan(expected[~inside]).sum() > 0.95 * (~inside).sum()
     good = inside & np.isfinite(expected)
@@ -168,8 +168,8 @@ def test_silhouette_is_orthographic_or_perspective_by_its_law() -> None:
     for effects in (frozenset(), frozenset(["perspective"])):
         scene, request = ball(), Request("depth", effects, (400, 400))
         view = view_of(scene, request)
-        area = (render(scene, request).rgba[..., 3] == 255).sum() * (view.height / 400) ** 2
-        radius = 0.5 / np.sqrt(1 - (0.5 / view.distance) ** 2) if effects else 0.5
+        area = (render(scene, request).rgba[..., 3] == 255).sum() * (view.camera.height / 400) ** 2
+        radius = 0.5 / np.sqrt(1 - (0.5 / view.camera.distance) ** 2) if effects else 0.5
         assert np.sqrt(area / np.pi) == pytest.approx(radius, rel=2e-3)
 
 
@@ -189,7 +189,7 @@ def test_outline_lies_on_the_silhouette_and_nowhere_else() -> None:
     scene = ball()
     request = Request("clay", frozenset(["outline"]), (SIDE, SIDE), samples=2, outline_px=3.0, outline_colour=INK)
     picture = render(scene, request).rgba
-    pixel = view_of(scene, request).height / SIDE
+    pixel = view_of(scene, request).camera.height / SIDE
     x = (np.arange(SIDE) + 0.5 - SIDE / 2) * pixel
     off = (np.hypot(x[None, :], x[:, None]) - 0.5) / pixel
     inked = (picture[..., 3] == 255) & (np.abs(picture[..., :3].astype(int) - INK).max(axis=-1) <= 2)
@@ -302,7 +302,8 @@ def test_smooth_union_rounds_creases_and_leaves_the_rest() -> None:
     assert len(round_.fillets) == 1
     # The ring where the balls cross lies inside of the smooth union now; far from it nothing has changed.
     scene = FieldScene(body)
-    hits = [s.meet(view_rays(scene), Needs(normals=True)) for s in (scene, FieldScene(round_))]
+    camera = view_of(scene, Request("depth", size=(120, 160))).camera
+    hits = [s.meet(camera, (0, 160), Needs(normals=True))[0] for s in (scene, FieldScene(round_))]
     both = np.isfinite(hits[0].depth) & np.isfinite(hits[1].depth)
     gain = hits[0].depth[both] - hits[1].depth[both]
     assert gain.min() > -1e-3
@@ -332,8 +333,3 @@ def test_smooth_union_keeps_the_drawn_contour() -> None:
     more = (bare[..., 3] != grown[..., 3]).sum() / (bare[..., 3] > 0).sum()
     assert more < 0.003
     assert (bare[..., 0] != grown[..., 0]).any()
-
-
-def view_rays(scene: FieldScene):  # type: ignore[no-untyped-def]
-    request = Request("depth", size=(120, 160))
-    return view_of(scene, request).rays(0.0, 0.0, request.size, (0, 160))
