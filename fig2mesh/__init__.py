@@ -14,7 +14,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.libraries import __version__
+from fig2mesh.conversion.libraries import __version__
 
 if TYPE_CHECKING:
     from exporters.validate import validate

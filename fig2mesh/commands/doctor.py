@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import click
 
-from fig2mesh.libraries import PACKAGES, SYSTEM_LIBRARIES, version
+from fig2mesh.conversion.libraries import PACKAGES, version
+from fig2mesh.mesh.close_pymeshlab import SYSTEM_LIBRARIES
 
 
 @click.command()

@@ -28,6 +28,7 @@ from fig2mesh.commands.train import train
 from fig2mesh.commands.validate import validate
 from fig2mesh.commands.view import view
 from fig2mesh.conversion.fields import request_fields
+from fig2mesh.conversion.libraries import __version__
 from fig2mesh.conversion.request import (
     FigureFiles,
     InferenceOptions,
@@ -35,7 +36,6 @@ from fig2mesh.conversion.request import (
     OutputOptions,
     PlaceRequest,
 )
-from fig2mesh.libraries import __version__
 
 GROUPS = {
     "Figure": FigureFiles,

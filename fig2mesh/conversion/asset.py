@@ -8,9 +8,9 @@ import numpy as np
 
 from exporters.asset import Asset, TexturedMesh
 from exporters.sampling import observed_share
+from fig2mesh.conversion.libraries import __version__
 from fig2mesh.conversion.place import Placed
 from fig2mesh.conversion.request import Request
-from fig2mesh.libraries import __version__
 from fig2mesh.settings import Settings
 from fig2mesh.skeleton import PART_NAMES
 

@@ -100,7 +100,7 @@ class RequestField:
 
 
 @functools.cache
-def request_fields(request: Any) -> tuple[RequestField, ...]:
+def request_fields(request: type) -> tuple[RequestField, ...]:
     """Fields of a request in the order in which they are defined, those of its base classes first."""
     hints = get_type_hints(request)
     found = []
@@ -132,7 +132,8 @@ def check_fields(request: Any) -> None:
 
     Raises InputError naming the option.
     """
-    for each in request_fields(type(request)):
+    kind: type = type(request)
+    for each in request_fields(kind):
         value = _checked(each, getattr(request, each.field))
         object.__setattr__(request, each.field, value)
 
@@ -239,8 +240,9 @@ def _truth(raw: object, source: str) -> bool:
 
 def as_plain(request: Any) -> dict[str, Any]:
     """Fields of a request that differ from their defaults, as JSON holds them; the class takes them as arguments."""
-    found = {}
-    for field in request_fields(type(request)):
+    found: dict[str, Any] = {}
+    kind: type = type(request)
+    for field in request_fields(kind):
         value = getattr(request, field.field)
         if value != field.default:
             found[field.field] = str(value) if isinstance(value, Path) else value

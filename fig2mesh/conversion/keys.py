@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import exporters
 import georef
-from fig2mesh.libraries import PACKAGES, version
+from fig2mesh.conversion.libraries import PACKAGES, version
 from fig2mesh.records import Figure
 from fig2mesh.settings import Settings
 from fig2mesh.stages.stage import Stage

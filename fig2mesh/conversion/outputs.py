@@ -81,7 +81,7 @@ def write(
     written: list[Path] = []
     for target in in_order(targets):
         if asset.placement is None:
-            refuse_unplaced(target)
+            refuse_unplaced(str(target))
         written += write_asset(asset, target, overwrite, visible_from, tiles_version, profile_named(profile))
     return tuple(written)
 

@@ -12,10 +12,10 @@ from exporters.file_digest import sha256_of
 from exporters.sampling import observed_shares
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
 from fig2mesh.conversion.convert import Conversion
+from fig2mesh.conversion.libraries import PACKAGES, __version__, version
 from fig2mesh.conversion.observer import Observer
 from fig2mesh.counters import Work
 from fig2mesh.image_frame import image_frame
-from fig2mesh.libraries import PACKAGES, __version__, version
 from fig2mesh.measure.model import front_similarity, shape_measures, silhouette_iou
 from fig2mesh.skeleton import PART_NAMES
 from fig2mesh.stages.lift import lift

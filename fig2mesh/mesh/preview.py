@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from exporters.asset import ByteArray, TexturedMesh
 from exporters.sampling import sample
 from fig2mesh.field.camera import axes
+from fig2mesh.mesh.pixels import straight_bytes
 from fig2mesh.mesh.raycast import MeshCaster, MeshHits, interpolated
-from fig2mesh.pixels import straight_bytes
 
 Mode = Literal["textured", "clay", "normals", "observed"]
 Bounds = tuple[float, float, float, float]

@@ -78,9 +78,15 @@ def read_figure(
     FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, no figure is
         found in the picture
     """
-    given = {"mask": mask, "keypoints": keypoints, "part_labels": part_labels}
-    files = {option: None if file is None else Path(file) for option, file in given.items()}
-    return read_parsed(Path(path), **files, bbox=bbox, name=name).figure
+    given = read_parsed(
+        Path(path),
+        mask=None if mask is None else Path(mask),
+        keypoints=None if keypoints is None else Path(keypoints),
+        part_labels=None if part_labels is None else Path(part_labels),
+        bbox=bbox,
+        name=name,
+    )
+    return given.figure
 
 
 def read_parsed(

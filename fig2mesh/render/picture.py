@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fig2mesh.pixels import straight_bytes
+from fig2mesh.mesh.pixels import straight_bytes
 from fig2mesh.records import ByteArray
 from fig2mesh.render.counts import Counts
 from fig2mesh.render.effects import Effect, Mode

@@ -6,8 +6,6 @@ import importlib.metadata
 
 __version__ = "0.1.0"
 
-SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 libopengl0 libusb-1.0-0"
-
 # fmt: off
 PACKAGES = {
     "numpy": "numpy", "scipy": "scipy", "numba": "numba", "torch": "torch", "open3d": "open3d-cpu",
