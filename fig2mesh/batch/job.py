@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 import logging
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+from exporters.atomic_file import atomic_path, sweep_temporary
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.engine import Engine, Stage
 from fig2mesh.batch.ledger import WORK, Ledger
@@ -77,9 +77,8 @@ def run(
     with _folder(output, dry_run, overwrite) as folder:
         batch = Batch(roots, folder, defaults, not resume, overwrite, unplaced)
         spool = folder / WORK / "rows.jsonl"
-        partial = spool.with_suffix(".partial")
-        count, unknown = write_spool(tasks_of(read_rows(collection, layer)), partial)
-        os.replace(partial, spool)
+        with atomic_path(spool) as partial:
+            count, unknown = write_spool(tasks_of(read_rows(collection, layer)), partial)
         if count == 0:
             raise InputError(collection, "has no rows", "give one row for each figure")
         _tell_unknown(unknown)
@@ -147,18 +146,12 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
         with lock:
-            _sweep(folder)
+            # The folders of figures are swept by their rows.
+            sweep_temporary(folder)
+            sweep_temporary(folder / WORK, below=True)
             yield folder
     except Timeout:
         raise OutputError(output, "another batch is writing there", "wait for it, or choose another -o DIR") from None
-
-
-def _sweep(folder: Path) -> None:
-    """Clear away what a killed run had not put in place yet; the folders of figures are cleared by their rows."""
-    for stale in folder.glob(".fig2mesh-*.tmp"):
-        shutil.rmtree(stale, ignore_errors=True)
-    for stale in (folder / WORK).glob("*/*/.*.partial*"):
-        stale.unlink(missing_ok=True)
 
 
 def _tell_unknown(unknown: dict[str, int]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -13,6 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from exporters import atomic_file
 from exporters.profiles import Profile, profile_named
 from exporters.write import check_outputs, has_levels, in_order, is_tileset, needs_place, write
 from fig2mesh.convert.asset import SETTING_OPTIONS, asset_of, settings_of, torch_device
@@ -254,25 +254,26 @@ def plan_of(*, figure: Path, outputs: tuple[str, ...], lods: int, **options: Any
     return plan(settings_of(device="cpu", **given), targets)
 
 
-def check_text(path: Path, overwrite: bool, option: str = "--report", another: str = "--report") -> None:
-    """Refuse a text file that could not be written; option, another : what its name is called in the remedy."""
+def check_text(path: Path, overwrite: bool, option: str = "--report") -> None:
+    """Refuse a text file that could not be written; option : the one that names it."""
     if path.is_dir():
         raise OutputError(path, "is a folder", f"give {option} a file name")
     if path.exists() and not overwrite:
-        raise OutputError(path, "exists", f"pass --overwrite or another {another}")
+        raise OutputError(path, "exists", f"pass --overwrite or {_another(option)}")
     if not path.parent.is_dir():
         raise OutputError(path, f"no folder {path.parent}", "create it first")
 
 
-def write_text(path: Path, text: str, another: str = "--report") -> None:
-    """Write a text file, whole or not at all; another : what its name is called in the remedy."""
-    partial = path.with_name(f".{path.name}.partial")
+def write_text(path: Path, text: str, option: str = "--report") -> None:
+    """Write a text file, whole or not at all; option : the one that names it. Raises OutputError."""
     try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
+        atomic_file.write_text(path, text)
     except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(path, error.strerror or "cannot be written", f"choose another {another}") from None
+        raise OutputError(path, error.strerror or "cannot be written", f"choose {_another(option)}") from None
+
+
+def _another(option: str) -> str:
+    return "another name" if option == "-o" else f"another {option}"
 
 
 def peak_mb() -> float:

@@ -10,14 +10,12 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-import os
-import secrets
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from exporters.atomic_file import atomic_path
 from exporters.errors import DAMAGE
 from fig2mesh.convert.record_types import check_fields, fits
 from fig2mesh.errors import FigureError, OutputError
@@ -88,14 +86,8 @@ def write_result(path: Path, stage: str, value: object) -> None:
     """Write what a stage made to a file of its own, whole or not at all; raises OSError where the disk refuses."""
     arrays: dict[str, Any] = {}
     tree = _pack(value, arrays)
-    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.partial.npz")
-    try:
+    with atomic_path(path) as partial:
         np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), __stage__=np.array(stage), **arrays)
-        os.replace(partial, path)
-    except OSError:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
-        raise
 
 
 def clear_stages(folder: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skimage.measure import find_contours
 
-from exporters.write import write_whole
+from exporters.atomic_file import write_whole
 from fig2mesh.convert.job import configure_logging, progress
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.parse.annotation import (

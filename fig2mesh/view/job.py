@@ -56,7 +56,7 @@ def run(
     if output is not None:
         if output.suffix.lower() not in (".html", ".htm"):
             raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
-        check_text(output, overwrite, "-o", "name")
+        check_text(output, overwrite, "-o")
     if cesium is not None and (not request.somewhere or output is not None):
         raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
     folders = {CESIUM: find_cesium(cesium, "--lonlat")} if request.somewhere and output is None else {}
@@ -75,7 +75,7 @@ def run(
         there = placed.placement
         page = view_page(scene, wanted) if there is None else globe_page(scene, there, f"{CESIUM}/", wanted)
     if output is not None:
-        write_text(output, page, "name")
+        write_text(output, page, "-o")
         log.info("%s: %.1f MB", output, len(page) / 1e6)
         return
     show(page_server(page, port, folders), open_)

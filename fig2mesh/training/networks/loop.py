@@ -14,7 +14,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +25,7 @@ import torch
 from torch import Tensor, nn
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
+from exporters.atomic_file import atomic_path, atomic_text, sweep_temporary, write_text
 from fig2mesh.errors import InputError
 
 CHECKPOINT = "checkpoint.pt"
@@ -138,6 +138,7 @@ def run_loop(
         **(arguments or {}),
     }
     folder.mkdir(parents=True, exist_ok=True)
+    sweep_temporary(folder)
     state = _State(torch.Generator().manual_seed(seed), _copy(model))
     _resume(folder, identity, model, optimizer, state)
 
@@ -247,19 +248,15 @@ def _log_row(state: _State, batch: int, rate: float, scores: Mapping[str, float]
 def write_log(path: Path, rows: list[dict[str, float]]) -> None:
     """Write the rows as CSV, one column a name; replaced as a whole, so that no row of a lost step remains."""
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    part = path.with_name(path.name + ".part")
-    with part.open("w", newline="", encoding="utf-8") as stream:
+    with atomic_text(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows([f"{row[name]:.6g}" if name in row else "" for name in columns] for row in rows)
-    os.replace(part, path)
 
 
 def write_scores(folder: Path, scores: Mapping[str, float]) -> None:
     """Write the scores of a finished run, whole or not at all."""
-    part = folder / (SCORES + ".part")
-    part.write_text(json.dumps(dict(scores), indent=1) + "\n", encoding="utf-8")
-    os.replace(part, folder / SCORES)
+    write_text(folder / SCORES, json.dumps(dict(scores), indent=1) + "\n")
 
 
 def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
@@ -287,7 +284,8 @@ def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
             axes.set_yscale("log")
         axes.set_title(title, fontsize="small")
         axes.legend(fontsize="x-small")
-    figure.savefig(path, dpi=80)
+    with atomic_path(path) as partial:
+        figure.savefig(partial, dpi=80)
 
 
 def _save(
@@ -310,9 +308,8 @@ def _save(
         "sums": state.sums,
         "summed": state.summed,
     }
-    part = folder / (CHECKPOINT + ".part")
-    torch.save(content, part)
-    os.replace(part, folder / CHECKPOINT)
+    with atomic_path(folder / CHECKPOINT) as partial:
+        torch.save(content, partial)
 
 
 def _resume(
