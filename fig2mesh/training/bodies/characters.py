@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.colour import srgb_from_linear
 from fig2mesh.errors import InputError
 from fig2mesh.mesh.simplify import simplify
 from fig2mesh.mesh.topology import check_solid, edge_pairs
@@ -87,8 +88,7 @@ def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> t
     soup = read_soup(path)
     mesh, visible = solidify(soup.corners, voxel)
     mesh = simplify(mesh, faces)
-    report = check_solid(mesh)
-    if not report.solid:
+    if not check_solid(mesh).solid:
         raise InputError(str(path), "its pieces make no closed body", "leave this character out")
     return bind(path.stem, mesh, soup, visible), soup.colours
 
@@ -137,14 +137,12 @@ def read_soup(path: Path) -> Soup:
     shape = np.concatenate(corners)
     real = np.linalg.norm(np.cross(shape[:, 1] - shape[:, 0], shape[:, 2] - shape[:, 0]), axis=1) > 1e-12
     scale = HEIGHT / np.ptp(shape[..., 1])
-    linear = np.array(list(found.values()))
-    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return Soup(
         shape[real] * scale,
         np.concatenate(weights)[real],
         np.concatenate(material)[real],
         tuple(kind for kind, _ in found),
-        srgb.astype(np.float32),
+        srgb_from_linear(np.array(list(found.values()))).astype(np.float32),
         names,
         parents,
         heads * scale,
