@@ -42,12 +42,6 @@ def vertex_colors(mesh: TexturedMesh) -> ByteArray | None:
     return np.repeat(samples, 3, axis=1) if samples.shape[1] == 1 else samples[:, :3]
 
 
-def linear_from_srgb(colors: ByteArray) -> NDArray[np.float64]:
-    """Linear light in [0, 1] of sRGB bytes, same shape (IEC 61966-2-1)."""
-    srgb = colors / 255.0
-    return np.asarray(np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4))
-
-
 def face_parts(mesh: TexturedMesh) -> ByteArray:
     """Part label (F,) uint8 of each triangle: the one at least two corners carry, else the first corner's."""
     assert mesh.parts is not None

@@ -1,6 +1,10 @@
-"""The closed surface behind a mesh whose vertices are split along texture seams.
+"""The closed surface behind a mesh whose vertices are split along texture seams, and whether it is one.
 
-Plain NumPy and one SciPy graph call, so that writers and validators can afford to measure every file.
+`measure_topology` is the only check of closedness, orientation, manifoldness, pieces, handles and volume; the repair
+of meshes has its own labels of edges and fans (`fig2mesh.mesh.topology`), and trimesh is the judge of tests and
+evaluations. All it finds is combinatorial except the volumes: coordinates never decide whether an edge is shared.
+Plain NumPy and SciPy's graphs, 0.1 s for 70,000 triangles, so that writers and validators can afford to measure every
+file.
 """
 
 from __future__ import annotations
@@ -48,46 +52,70 @@ def merged_by_position(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDA
 class Topology:
     """What the edges of a triangle mesh say; all counts of zero faults mean a closed, oriented, manifold surface.
 
+    vertices, triangles : counts; vertices that no triangle uses do not count
     boundary_edges : edges with one triangle
     nonmanifold_edges : edges with three triangles or more
     misoriented_edges : edges whose two triangles run along them in the same direction
     nonmanifold_vertices : further fans of triangles that meet an earlier fan in nothing but one vertex
     degenerate_faces : triangles that name a vertex twice
-    components : pieces connected over edges
+    components : pieces connected over edges of two triangles
+    euler : vertices - edges + triangles
     genus : number of handles, all pieces together; None unless the surface is closed, oriented and manifold
     volume : enclosed volume in cubic units of the vertices, positive if faces are counter-clockwise from outside
+    least_volume : that of the piece with the smallest one; negative for cavities and pieces turned inside out
     """
 
+    vertices: int
+    triangles: int
     boundary_edges: int
     nonmanifold_edges: int
     misoriented_edges: int
     nonmanifold_vertices: int
     degenerate_faces: int
     components: int
+    euler: int
     genus: int | None
     volume: float
+    least_volume: float
 
     @property
     def closed(self) -> bool:
         """No edge is open or shared by more than two triangles."""
-        return not (self.boundary_edges or self.nonmanifold_edges or self.degenerate_faces)
+        return self.triangles > 0 and not (self.boundary_edges or self.nonmanifold_edges or self.degenerate_faces)
+
+    @property
+    def oriented(self) -> bool:
+        """Neighbours agree on which side is out."""
+        return not self.misoriented_edges
+
+    @property
+    def manifold(self) -> bool:
+        """No edge with a third triangle and no vertex where two fans meet."""
+        return not (self.nonmanifold_edges or self.nonmanifold_vertices or self.degenerate_faces)
 
     @property
     def solid(self) -> bool:
         """Closed, consistently oriented and manifold."""
-        return self.closed and not (self.misoriented_edges or self.nonmanifold_vertices)
+        return self.closed and self.oriented and self.manifold
+
+    @property
+    def outward(self) -> bool:
+        """A solid whose every piece has its inside inside: none is a cavity or turned inside out."""
+        return self.solid and self.least_volume > 0
 
 
 def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
     """Count the faults, pieces and handles of a triangle mesh.
 
-    vertices : (V, 3) float, any frame; faces : (F, 3) integer, at least one
+    vertices : (V, 3) float, any frame; faces : (F, 3) integer
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     corners = np.asarray(faces, dtype=np.int64)
     count = len(corners)
+    if not count:
+        return Topology(0, 0, 0, 0, 0, 0, 0, 0, 0, None, 0.0, 0.0)
     start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
     low, high = np.minimum(start, end), np.maximum(start, end)
     key = low * (int(corners.max()) + 1) + high
@@ -97,28 +125,53 @@ def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
     one, two = order[pairs], order[pairs + 1]  # half-edges 3 * face + corner that share an edge
     same_way = start[one] == start[two]
 
-    def pieces(size: int, left: NDArray[np.int64], right: NDArray[np.int64]) -> int:
+    def pieces(size: int, left: NDArray[np.int64], right: NDArray[np.int64]) -> tuple[int, NDArray[np.int32]]:
         links = coo_matrix((np.ones(len(left), dtype=np.int8), (left, right)), shape=(size, size))
-        return int(connected_components(links, directed=False)[0])
+        number, labels = connected_components(links, directed=False)
+        return int(number), labels
 
-    components = pieces(count, one // 3, two // 3)
+    components, piece = pieces(count, one // 3, two // 3)
     # Half-edge h leaves corner h and reaches the next corner of its triangle. Joining corners that are the same
     # vertex of neighbours leaves one group of corners per fan; a clean vertex has exactly one fan.
     following = np.roll(np.arange(3 * count).reshape(-1, 3), -1, axis=1).reshape(-1)
     left = np.concatenate([one, following[one]])
     right = np.concatenate([np.where(same_way, two, following[two]), np.where(same_way, following[two], two)])
-    fans = pieces(3 * count, left, right)
+    fans, _ = pieces(3 * count, left, right)
     used = len(np.unique(corners))
 
     nonmanifold, boundary = int((uses > 2).sum()), int((uses == 1).sum())
     degenerate = int((start == end).reshape(-1, 3).any(axis=1).sum())
     clean = not (nonmanifold or boundary or degenerate or same_way.any() or fans != used)
-    genus = (2 * components - (used - len(uses) + count)) // 2 if clean else None
+    euler = used - len(uses) + count
     triangles = np.asarray(vertices, dtype=np.float64)[corners]
     volume = float(np.einsum("ij,ij->", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6.0)
     return Topology(
-        boundary, nonmanifold, int(same_way.sum()), max(fans - used, 0), degenerate, components, genus, volume
+        vertices=used,
+        triangles=count,
+        boundary_edges=boundary,
+        nonmanifold_edges=nonmanifold,
+        misoriented_edges=int(same_way.sum()),
+        nonmanifold_vertices=max(fans - used, 0),
+        degenerate_faces=degenerate,
+        components=components,
+        euler=euler,
+        genus=components - euler // 2 if clean else None,
+        volume=volume,
+        least_volume=float(piece_volumes(triangles, piece).min()),
     )
+
+
+def piece_volumes(triangles: NDArray[np.float64], piece: NDArray[np.int32]) -> NDArray[np.float64]:
+    """(P,) signed volume of each piece, cubic units of the vertices.
+
+    triangles : (F, 3, 3) corners; piece : (F,) number of the piece that each belongs to
+    """
+    # Measured from the piece's own middle: far from the origin the determinants would cancel badly.
+    count = np.bincount(piece)
+    middle = np.stack([np.bincount(piece, triangles[:, 0, axis]) for axis in range(3)], axis=1) / count[:, None]
+    near = triangles - middle[piece][:, None]
+    six_fold = np.einsum("fi,fi->f", near[:, 0], np.cross(near[:, 1], near[:, 2]))
+    return np.asarray(np.bincount(piece, six_fold) / 6.0)
 
 
 def unit_normals(normals: FloatArray) -> FloatArray:

@@ -1,20 +1,14 @@
-"""Path to writer, and files that appear whole or not at all.
-
-A writer writes into a hidden folder beside its target; only when it has finished are its files renamed into place,
-the one that names the others last. What goes wrong before or during that leaves the disk as it was.
-"""
+"""Path to writer. The files of an output appear whole or not at all, the one that names the others last."""
 
 from __future__ import annotations
 
 import os
-import secrets
-import shutil
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from exporters.asset import Asset
+from exporters.atomic_file import write_whole
 from exporters.errors import ExportError
 from exporters.gis.czml import write_czml
 from exporters.gis.geojson import write_geojson
@@ -161,34 +155,6 @@ def write(
     return write_whole(path, main, fill, overwrite)
 
 
-def write_whole(
-    path: OutputPath,
-    main: Path,
-    fill: Callable[[Path], None],
-    overwrite: bool,
-    outdated: Iterable[str] = (),
-) -> tuple[Path, ...]:
-    """Put the files that `fill` makes in a folder beside `main`, all of them or none; `main` comes last.
-
-    path : the output as it was asked for, for messages
-    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others, folders too
-    outdated : files beside `main`, slashes between folders, that go where `fill` makes none of their name
-    returns : the files written
-
-    Raises ExportError where the disk refuses, or a file is there already although `overwrite` is off.
-    """
-    try:
-        with _folders(main.parent), _staging(main.parent) as stage:
-            fill(stage)
-            files = (file.relative_to(stage).as_posix() for file in stage.rglob("*") if file.is_file())
-            names = sorted(name for name in files if name != main.name) + [main.name]
-            _put_in_place(stage, main.parent, names, overwrite, sorted(set(outdated) - set(names)))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ExportError(os.fspath(path), f"cannot be written ({reason})", "choose another folder") from error
-    return tuple(main.parent / name for name in names)
-
-
 def _main_file(path: OutputPath) -> Path:
     if is_tileset(path):
         folder = Path(path)
@@ -227,77 +193,3 @@ def check_file(path: OutputPath, main: Path, overwrite: bool) -> None:
         raise ExportError(name, f"{ancestor} is not a folder", "choose another folder")
     if not os.access(ancestor, os.W_OK | os.X_OK):
         raise ExportError(name, f"no permission to write into {ancestor}", "choose another folder")
-
-
-@contextmanager
-def _folders(folder: Path) -> Iterator[None]:
-    """Make a folder and the ones above it; take them away again if the body fails."""
-    absolute = Path(os.path.abspath(folder))
-    missing = [each for each in (absolute, *absolute.parents) if not each.exists()]
-    try:
-        absolute.mkdir(parents=True, exist_ok=True)
-        yield
-    except BaseException:
-        for each in missing:
-            try:
-                each.rmdir()
-            except OSError:
-                break  # someone else has put something in: it stays
-        raise
-
-
-@contextmanager
-def _staging(folder: Path) -> Iterator[Path]:
-    # In the same folder, as only a rename within one file system is atomic. Not from tempfile: its folders are
-    # private to the user, and the files' permissions should be those that the user's umask gives.
-    stage = folder / f".fig2mesh-{os.getpid()}-{secrets.token_hex(4)}.tmp"
-    stage.mkdir()
-    try:
-        yield stage
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-
-
-def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool, outdated: list[str]) -> None:
-    """Rename staged files into their folder in this order, or leave the folder as it was."""
-    # Hidden, so that it is no folder of an output.
-    backup = stage / ".replaced"
-    kept, new, made = [], [], []
-    try:
-        for name in names:
-            target = folder / name
-            for parent in reversed(Path(name).parents):
-                if not (folder / parent).exists():
-                    (folder / parent).mkdir()
-                    made.append(folder / parent)
-            if target.exists():
-                if not overwrite and target.read_bytes() != (stage / name).read_bytes():
-                    # Equal bytes are no conflict: .gltf and .obj of one figure share their texture.
-                    raise ExportError(target, "exists already", "use --overwrite or choose another name")
-                _keep(target, backup / name)
-                kept.append(name)
-            else:
-                new.append(name)
-            os.replace(stage / name, target)
-        for name in outdated:
-            if (folder / name).is_file():
-                _keep(folder / name, backup / name)
-                kept.append(name)
-                (folder / name).unlink()
-    except BaseException:
-        for name in kept:
-            os.replace(backup / name, folder / name)
-        for name in new:
-            (folder / name).unlink(missing_ok=True)
-        for each in reversed(made):
-            with suppress(OSError):
-                each.rmdir()
-        raise
-
-
-def _keep(file: Path, copy: Path) -> None:
-    copy.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        os.link(file, copy)
-    except OSError:  # file systems without hard links
-        shutil.copy2(file, copy)

@@ -11,7 +11,7 @@ from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT
 from georef.frames import ASSET, FIGURE
 from georef.transform import Transform
 
-STANDING = 0.12
+STANDING_FOOT_SHARE = 0.12
 """A foot this share of the figure's height above the other one does not stand."""
 
 
@@ -35,7 +35,7 @@ def _stand(joints: FloatArray) -> NDArray[np.float64]:
     """(D,) the middle of the standing feet of (21, D) FIGURE joints."""
     feet = [[joints[JOINT[f"{side}_{joint}"]] for joint in ("ankle", "foot")] for side in "lr"]
     middles = np.array(feet, np.float64).mean(axis=1)
-    standing = middles[:, 1] <= middles[:, 1].min() + STANDING * FIGURE_HEIGHT
+    standing = middles[:, 1] <= middles[:, 1].min() + STANDING_FOOT_SHARE * FIGURE_HEIGHT
     return np.asarray(middles[standing].mean(axis=0))
 
 

@@ -7,16 +7,15 @@ https://github.com/stac-extensions/file
 from __future__ import annotations
 
 import json
-import os
 import posixpath
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 from urllib.parse import quote
 
+from exporters.atomic_file import atomic_text, write_text
 from exporters.file_digest import sha256_of
 from exporters.gis.geojson import OWN_PROPERTIES, feature, free_names
 from exporters.gis.stac_extent import Extent
@@ -177,14 +176,13 @@ def write_stac(
     if license_link is not None:
         links.append({"rel": "license", "href": license_link})
     extent = Extent()
-    with _replaced(folder / COLLECTION_FILE) as stream:
+    with atomic_text(folder / COLLECTION_FILE) as stream:
         stream.write(_text(head)[:-1] + ',"links":[\n' + ",\n".join(map(_text, links)))
         for item in items:
             document = item_document(item, id)
             extent.add(document["geometry"]["coordinates"], time_span(item.datetime))
             (folder / item.path).parent.mkdir(parents=True, exist_ok=True)
-            with _replaced(folder / item.path) as file:
-                file.write(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+            write_text(folder / item.path, json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
             link = {"rel": "item", "href": _href(item.path, ""), "type": "application/geo+json"}
             stream.write(",\n" + _text(link | {"title": document["properties"]["title"]}))
         stream.write('\n],"extent":' + _text(extent.document()) + "}\n")
@@ -219,19 +217,6 @@ def _href(path: str, folder: str) -> str:
     relative = posixpath.relpath(path, folder or ".")
     text = re.sub(r"[\x00-\x7f]+", lambda match: quote(match[0]), relative)
     return text if text.startswith("../") else f"./{text}"
-
-
-@contextmanager
-def _replaced(path: Path) -> Iterator[TextIO]:
-    """A stream whose text becomes the file when all of it is written."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with part.open("w", encoding="utf-8", newline="\n") as stream:
-            yield stream
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def _text(document: dict[str, Any]) -> str:

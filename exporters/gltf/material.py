@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import Texture, TexturedMesh
+from exporters.colour import linear_from_srgb
 from exporters.gltf.document import Document
 from exporters.profiles import Profile
-from exporters.sampling import linear_from_srgb
 
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
 
@@ -40,7 +40,7 @@ def material(document: Document, mesh: TexturedMesh, lit: bool, profile: Profile
         document.json["textures"] = [texture]
         surface["baseColorTexture"] = {"index": 0}
     elif mesh.colors is not None and not profile.vertex_colors:
-        mean = linear_from_srgb(mesh.colors).mean(axis=0)
+        mean = linear_from_srgb(mesh.colors / 255.0).mean(axis=0)
         surface["baseColorFactor"] = [*np.round(mean, 4).tolist(), 1.0]
     item: dict[str, Any] = {"name": "drawing", "pbrMetallicRoughness": surface}
     if not lit and profile.extensions:
@@ -75,5 +75,5 @@ def linear_rgba(colors: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """sRGB bytes (V, 3) as COLOR_0: linear light, 16 bits, opaque."""
     # COLOR_0 is linear, and 8 bits of linear light band in the dark. Alpha keeps the rows at a multiple of 4 bytes.
     rgba = np.full((len(colors), 4), 65535, dtype=np.uint16)
-    rgba[:, :3] = np.rint(linear_from_srgb(colors) * 65535)
+    rgba[:, :3] = np.rint(linear_from_srgb(colors / 255.0) * 65535)
     return rgba

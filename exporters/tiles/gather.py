@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+from exporters.atomic_file import write_whole
 from exporters.errors import ExportError
 from exporters.figure_reader import describe, read_figures
 from exporters.gis.czml import write_packets
@@ -22,7 +23,7 @@ from exporters.tiles.b3dm import b3dm_bytes
 from exporters.tiles.check import read_tileset
 from exporters.tiles.tileset import CONTENT_SUFFIXES, TilesVersion, check_distance, safe_name
 from exporters.tiles.tree import tileset_documents
-from exporters.write import OutputPath, check_file, write_whole
+from exporters.write import OutputPath, check_file
 
 CONTENT_FOLDER = "figures"
 INDEX, ENTITIES = "index.geojson", "figures.czml"
@@ -97,7 +98,7 @@ def write_tree(
     """Write the tileset, and `index.geojson` and `figures.czml`, over figures whose contents are there already.
 
     figures : at least one, in an order that does not change from run to run; `contents` as seen from the folder
-    folder : has to be there; files of the same names are replaced, so let `exporters.write.write_whole` give it
+    folder : has to be there; files of the same names are replaced, so let `exporters.atomic_file.write_whole` give it
     name : of the tileset file to open
     """
     glb = version == "1.1"

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from exporters.asset import TexturedMesh
-from exporters.sampling import face_parts, linear_from_srgb, vertex_colors
+from exporters.colour import linear_from_srgb
+from exporters.sampling import face_parts, vertex_colors
 from exporters.solid import solid_of, unit_normals
 
 NORMAL_TOLERANCE = 1e-3
@@ -66,7 +67,7 @@ def _define_display_color(mesh: Any, source: TexturedMesh, first: Any) -> None:
     colors = vertex_colors(source)
     if colors is None:
         return
-    linear = linear_from_srgb(colors[first]).astype(np.float32)
+    linear = linear_from_srgb(colors[first] / 255.0).astype(np.float32)
     primvar = mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
     primvar.Set(Vt.Vec3fArray.FromNumpy(linear))
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 import logging
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+from exporters.atomic_file import atomic_path, sweep_temporary
 from exporters.gis.time_span import time_span
 from exporters.tiles.tileset import too_near_note
 from fig2mesh.batch.collections.read import read_rows
@@ -48,9 +48,8 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
     with _folder(request.output, request.dry_run, request.overwrite) as folder:
         batch = Batch(roots, folder, not request.resume, request.overwrite, request.unplaced)
         spool = folder / WORK / "rows.jsonl"
-        partial = spool.with_suffix(".partial")
-        count, unknown = write_spool(tasks_of(read_rows(request.collection, request.layer), defaults), partial)
-        os.replace(partial, spool)
+        with atomic_path(spool) as partial:
+            count, unknown = write_spool(tasks_of(read_rows(request.collection, request.layer), defaults), partial)
         if count == 0:
             raise InputError(request.collection, "has no rows", "give one row for each figure")
         _tell_unknown(unknown)
@@ -121,18 +120,12 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
         with lock:
-            _sweep(folder)
+            # The folders of figures are swept by their rows.
+            sweep_temporary(folder)
+            sweep_temporary(folder / WORK, below=True)
             yield folder
     except Timeout:
         raise OutputError(output, "another batch is writing there", "wait for it, or choose another -o DIR") from None
-
-
-def _sweep(folder: Path) -> None:
-    """Clear away what a killed run had not put in place yet; the folders of figures are cleared by their rows."""
-    for stale in folder.glob(".fig2mesh-*.tmp"):
-        shutil.rmtree(stale, ignore_errors=True)
-    for stale in (folder / WORK).glob("*/*/.*.partial*"):
-        stale.unlink(missing_ok=True)
 
 
 def _tell_unknown(unknown: dict[str, int]) -> None:

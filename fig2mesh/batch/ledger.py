@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import secrets
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from exporters.atomic_file import write_text
 from georef.untrusted.json_file import parse_json
 
 WORK: Final = ".fig2mesh"
@@ -54,14 +52,7 @@ class Ledger:
         """Keep a record. Raises OSError where the disk refuses."""
         path = self.path(name)
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".{secrets.token_hex(4)}.partial")
-        try:
-            partial.write_text(json.dumps([record, _digest(record)], ensure_ascii=False), encoding="utf-8")
-            os.replace(partial, path)
-        except OSError:
-            with suppress(OSError):
-                partial.unlink(missing_ok=True)
-            raise
+        write_text(path, json.dumps([record, _digest(record)], ensure_ascii=False))
 
     def names(self) -> set[str]:
         """Names of all figures that were ever begun here."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import re
-import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from exporters.atomic_file import sweep_temporary, without_temporary
 from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
 from fig2mesh.batch.resolved_row import ResolvedRow
@@ -35,8 +34,6 @@ UNKNOWN_DATE = "0001/9999"
 """A catalogue must have a date; when a file was changed says nothing of the drawing, and is lost by copying."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
-
-STAGING = re.compile(r"\.fig2mesh-\w+-\w+\.tmp/")
 
 LASTING = ("claimed", "files")
 """What a record says of the folder, whatever becomes of the row: whether a batch has begun it, files that are ours."""
@@ -125,7 +122,7 @@ def _full(error: BaseException | None) -> bool:
 
 def _line(error: Exception) -> str:
     # Nobody has to know where files are before they are in place.
-    return " ".join(STAGING.sub("", str(error)).split())[:500] or type(error).__name__
+    return " ".join(without_temporary(str(error)).split())[:500] or type(error).__name__
 
 
 def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> None:
@@ -138,8 +135,7 @@ def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> 
     record["claimed"] = True
     ledger.write(task.name, record)
     if target.is_dir():
-        for stale in target.glob(".fig2mesh-*.tmp"):
-            shutil.rmtree(stale, ignore_errors=True)
+        sweep_temporary(target)
 
 
 def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance: Advance) -> dict[str, Any]:
@@ -203,7 +199,8 @@ def _write(row: ResolvedRow, asset: Asset, before: Sequence[str]) -> dict[str, t
 
     before : files that an earlier run has left in the folder of the figure
     """
-    from exporters.write import in_order, write, write_whole
+    from exporters.atomic_file import write_whole
+    from exporters.write import in_order, write
 
     folder, profile = row.batch.folder / row.task.name, row.profile()
     main = folder / row.targets[0]

@@ -85,7 +85,7 @@ def summarise(collection: Collection) -> Summary:
     before = _before(folder)
     if before["digest"] == digest.hexdigest() and stand(folder, before["files"]):
         return Summary(*counts, (), tuple(sorted(left)))
-    from exporters.write import write_whole
+    from exporters.atomic_file import write_text, write_whole
 
     def fill(stage: Path) -> None:
         _fill(stage, collection, figures, dates)
@@ -95,7 +95,7 @@ def summarise(collection: Collection) -> Summary:
     names = [file.relative_to(folder).as_posix() for file in files]
     own = {name: digest_of(folder / name) for name in names}
     state = {"digest": digest.hexdigest(), "files": own}
-    _state_path(folder).write_text(json.dumps(state), encoding="utf-8")
+    write_text(_state_path(folder), json.dumps(state))
     return Summary(*counts, tuple(names), tuple(sorted(left)))
 
 

@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
-import secrets
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from exporters.atomic_file import atomic_path
 from exporters.errors import DAMAGE
 from fig2mesh.conversion.record_types import check_fields, fits, records_in
 from fig2mesh.errors import FigureError
@@ -33,14 +31,8 @@ def write_record(path: Path, title: str, value: object) -> None:
     """
     arrays: dict[str, Any] = {}
     tree = _pack(value, arrays)
-    partial = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.partial.npz")
-    try:
+    with atomic_path(path) as partial:
         np.savez_compressed(partial, __tree__=np.array(json.dumps(tree)), __stage__=np.array(title), **arrays)
-        os.replace(partial, path)
-    except OSError:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
-        raise
 
 
 def read_record(path: Path, title: str, kind: Any) -> Any:

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
+from exporters import atomic_file
 from fig2mesh.errors import OutputError
 
 
-def check_text(path: Path, overwrite: bool, option: str = "--report", another: str = "--report") -> None:
-    """Refuse a text file that could not be written; option, another : what its name is called in the remedy."""
+def check_text(path: Path, overwrite: bool, option: str = "--report") -> None:
+    """Refuse a text file that could not be written; option : the one that names it. Raises OutputError."""
     if path.is_dir():
         raise OutputError(path, "is a folder", f"give {option} a file name")
     if path.exists() and not overwrite:
-        raise OutputError(path, "exists", f"pass --overwrite or another {another}")
+        raise OutputError(path, "exists", f"pass --overwrite or {_another(option)}")
     if not path.parent.is_dir():
         raise OutputError(path, f"no folder {path.parent}", "create it first")
 
 
-def write_text(path: Path, text: str, another: str = "--report") -> None:
-    """Write a text file, whole or not at all; another : what its name is called in the remedy."""
-    partial = path.with_name(f".{path.name}.partial")
+def write_text(path: Path, text: str, option: str = "--report") -> None:
+    """Write a text file, whole or not at all; option : the one that names it. Raises OutputError."""
     try:
-        partial.write_text(text, encoding="utf-8")
-        os.replace(partial, path)
+        atomic_file.write_text(path, text)
     except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(path, error.strerror or "cannot be written", f"choose another {another}") from None
+        raise OutputError(path, error.strerror or "cannot be written", f"choose {_another(option)}") from None
+
+
+def _another(option: str) -> str:
+    return "another name" if option == "-o" else f"another {option}"

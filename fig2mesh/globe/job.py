@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-import os
-import secrets
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from exporters.atomic_file import atomic_folder
 from fig2mesh.errors import OutputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
@@ -47,27 +46,13 @@ def run(
 
 def write_folder(folder: Path, page: str, files: dict[str, Path], cesium: Path) -> None:
     """Write page, files and CesiumJS into a folder that any web server can serve; an older one is replaced whole."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    stage = folder.parent / f".fig2mesh-{os.getpid()}-{secrets.token_hex(4)}.tmp"
-    old = stage.with_suffix(".old")
-    stage.mkdir()
-    try:
+    with atomic_folder(folder) as stage:
         (stage / PAGE).write_text(page, encoding="utf-8")
         for address, file in files.items():
             target = stage / address
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(file, target)
         shutil.copytree(cesium, stage / CESIUM, ignore=shutil.ignore_patterns("*.map"))
-        if folder.exists():
-            folder.rename(old)
-        stage.rename(folder)
-    except BaseException:
-        if old.exists() and not folder.exists():
-            old.rename(folder)
-        raise
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
 
 
 def _check_folder(folder: Path, overwrite: bool) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import ByteArray, Texture, TexturedMesh
+from exporters.colour import srgb_from_linear
 from exporters.errors import ExportError
 from exporters.solid import merged_by_position, solid_of, unit_normals
 from exporters.triangle_files import check_triangle_file
@@ -204,8 +205,7 @@ def _srgb(stored: NDArray[Any]) -> ByteArray:
     """sRGB bytes of glTF's vertex colours, which are linear: floats, or integers that mean the range [0, 1]."""
     whole = np.iinfo(stored.dtype).max if stored.dtype.kind == "u" else 1.0
     linear = np.clip(stored / whole, 0.0, 1.0)
-    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(255 * curved), dtype=np.uint8)
+    return np.asarray(np.rint(255 * srgb_from_linear(linear)), dtype=np.uint8)
 
 
 def front_pixels(

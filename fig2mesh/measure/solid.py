@@ -52,7 +52,8 @@ class Laws:
 
     closed : every edge has a triangle on both sides; manifold : no edge has a third one, every vertex a single fan,
         and neighbours agree on the outside
-    components : pieces connected over edges; genus : handles of all of them together
+    components : pieces connected over edges; genus : handles of all of them together,
+        meaningful where closed and manifold
     inner_shells : components with negative volume, or with most vertices inside another one. They are cavities or
         bodies within bodies: no view shows them, but slicers and volumes do.
     crossing : triangles that pass through another one; a printed or cut model has no inside there
@@ -116,10 +117,10 @@ def laws(mesh: TexturedMesh) -> Laws:
     body = solid_mesh(mesh)
     found = check_solid(body)
     return Laws(
-        closed=found.closed,
+        closed=found.triangles > 0 and not found.boundary_edges,
         manifold=found.manifold and found.oriented,
         components=found.components,
-        genus=found.genus,
+        genus=found.components - found.euler // 2,
         inner_shells=inner_shells(body),
         crossing=crossing_triangles(body),
         turned=turned_normals(mesh),

@@ -109,10 +109,10 @@ def close(
     before = len(current.faces)
     current = compact(_drop_hollow(current, SLIVER * grain))
     dropped += before - len(current.faces)
-    if not check_solid(current).solid:
+    if not check_solid(current).outward:
         return _replace(field, spacing, number, f"{used} left a mesh that encloses nothing")
     refined = refine(current, field, LONG_EDGE * grain)
-    if not check_solid(refined).solid:
+    if not check_solid(refined).outward:
         refined = current
     split = len(refined.vertices) - len(current.vertices)
     return refined, CloseReport(used, number, holes, dropped, added, split, fallback)

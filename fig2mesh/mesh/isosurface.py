@@ -59,8 +59,7 @@ def extract(grid: Grid) -> Mesh:
     window = np.ascontiguousarray(values[tuple(slice(a, b) for a, b in zip(low, high, strict=True))])
     vertices, faces, _, _ = marching_cubes(window, 0.0)
     mesh = as_mesh((vertices + low) * grid.spacing + grid.origin, faces)
-    report = check_solid(mesh)
-    if report.closed and report.oriented and report.manifold:
+    if check_solid(mesh).solid:
         return mesh
     vertices, faces = tetrahedra(window)
     return as_mesh((vertices + low) * grid.spacing + grid.origin, faces)

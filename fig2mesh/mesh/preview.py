@@ -11,7 +11,6 @@ to the right as seen, and up. "VIEW" below: right as seen, up, towards the camer
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import ByteArray, TexturedMesh
+from exporters.atomic_file import atomic_path
 from exporters.sampling import sample
 from fig2mesh.field.camera import axes
 from fig2mesh.mesh.pixels import straight_bytes
@@ -159,15 +159,9 @@ def write_preview(
     """
     from PIL import Image
 
-    path = Path(path)
     sheet = views_sheet(mesh, drawing_rgba, yaws=(0, 90, 180), height=height)
-    partial = path.with_name(f".{path.name}.partial")
-    try:
+    with atomic_path(Path(path)) as partial:
         Image.fromarray(sheet).save(partial, "PNG")
-        os.replace(partial, path)
-    except OSError:
-        partial.unlink(missing_ok=True)
-        raise
 
 
 def _fitted(bounds: Bounds, size: tuple[int, int]) -> Bounds:

@@ -57,7 +57,7 @@ def simplify(mesh: Mesh, triangles: int) -> Mesh:
 
 def _improved(mesh: Mesh) -> Mesh:
     """Without slivers, as far as that adds no fold; a mesh that is no solid is left alone."""
-    if not (triangle_quality(mesh.vertices, mesh.faces) < LEAST_QUALITY).any() or not check_solid(mesh).solid:
+    if not (triangle_quality(mesh.vertices, mesh.faces) < LEAST_QUALITY).any() or not check_solid(mesh).outward:
         return mesh
     better = without_slivers(mesh)
     return better if _folds(better) <= _folds(mesh) else mesh
@@ -89,8 +89,8 @@ def _simplify_piece(mesh: Mesh, target: int) -> Mesh:
         for way in ways:
             candidate = way(mesh, target)
             after = check_solid(candidate)
-            same = after.components == before.components and after.genus == before.genus
-            if not (after.solid and same and len(candidate.faces) <= 1.02 * target + 2):
+            same = after.components == before.components and after.euler == before.euler
+            if not (after.outward and same and len(candidate.faces) <= 1.02 * target + 2):
                 continue
             passed.append((_folds(candidate), candidate))
             if passed[-1][0] <= folds:

@@ -58,12 +58,12 @@ def make_solid(cloud: PointCloud | None, body: Body, pieces: int, *, spacing: fl
     closed, report = close(ball_pivot(cloud, spacing), body, method=closing)
     mesh, crumbs = _without_crumbs(closed, pieces)
     found = check_solid(mesh)
-    if found.solid and found.components == pieces:
+    if found.outward and found.components == pieces:
         mesher = "isosurface" if report.method == "isosurface" else "ball-pivot"
         return Solid(mesh, Meshing(mesher, report, found.components, crumbs, report.fallback))
     reason = f"ball pivoting made {found.components} components of {pieces} drawn pieces"
     other = _by_isosurface(body, spacing, pieces, reason)
-    if found.solid and other.how.components != pieces:
+    if found.outward and other.how.components != pieces:
         return Solid(mesh, Meshing("ball-pivot", report, found.components, crumbs, reason))
     return other
 

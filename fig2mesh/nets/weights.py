@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any, Final, Generic, TypeVar, cast
 import torch
 from torch import Tensor, nn
 
+from exporters.atomic_file import atomic_path
 from fig2mesh.errors import InputError
 from georef.untrusted.json_file import parse_json
 
@@ -37,11 +37,10 @@ def save(path: Path, state: Mapping[str, Tensor], facts: Mapping[str, Any]) -> N
         for name, value in state.items()
     }
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(path.name + ".part")
-    save_file(halves, part, {KEY: json.dumps(dict(facts), sort_keys=True)})
-    # safetensors writes for the owner alone; package data is for everybody.
-    part.chmod(0o644)
-    os.replace(part, path)
+    with atomic_path(path) as partial:
+        save_file(halves, partial, {KEY: json.dumps(dict(facts), sort_keys=True)})
+        # safetensors writes for the owner alone; package data is for everybody.
+        partial.chmod(0o644)
 
 
 def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, PngImagePlugin
 
-from exporters.write import write_whole
+from exporters.atomic_file import write_whole
 from fig2mesh.parse.joint_writers import WRITERS
 from fig2mesh.records import BoolArray, ByteArray, DepthOrder, Figure, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES, LABEL_COLOURS, PART_NAMES

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skimage.measure import find_contours
 
-from exporters.write import write_whole
+from exporters.atomic_file import write_whole
 from fig2mesh.parse.annotation import Annotation, on_whole_picture, save_annotation
 from fig2mesh.parse.joint_writers import as_coco
 from fig2mesh.parse.read import Reading

@@ -24,7 +24,7 @@ from fig2mesh.parts.split import Layer, Split
 from fig2mesh.records import PartSdf
 from fig2mesh.skeleton import JOINT, PART
 
-STANDING = 0.12
+STANDING_FOOT_UNITS = 0.12
 """Feet whose tip is at most this far above the lowest point of the figure stand on the ground, FIGURE units."""
 
 NOOK = 0.045
@@ -196,10 +196,11 @@ class _Inflation:
 def _may_end_flat(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Labels of what may end flat: garments that legs come out of or that hide them, feet that stand on the ground."""
     ground = canvas.points()[canvas.inside][:, 1].min()
+    highest = ground + STANDING_FOOT_UNITS
     standing = [
         PART[f"{side}_foot"]
         for side in "lr"
-        if joints[JOINT[f"{side}_foot"], 1] < ground + STANDING and joints[JOINT[f"{side}_ankle"], 1] > ground
+        if joints[JOINT[f"{side}_foot"], 1] < highest and joints[JOINT[f"{side}_ankle"], 1] > ground
     ]
     legs = [limb for limb in divided.limbs if not limb.is_arm]
     hems = [PART["garment"]] if not legs or any(limb.cloth for limb in legs) else []

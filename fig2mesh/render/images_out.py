@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from exporters.write import check_file, write_whole
+from exporters.atomic_file import write_whole
+from exporters.write import check_file
 from fig2mesh.errors import OutputError
 from fig2mesh.records import ByteArray
 

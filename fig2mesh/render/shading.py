@@ -1,4 +1,4 @@
-"""Light and shade of points, as formulas of arrays; light is added up linearly (IEC 61966-2-1), not as sRGB."""
+"""Light and shade of points, as formulas of arrays; light is added up linearly, not as sRGB."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.colour import linear_from_srgb, srgb_from_linear
 from fig2mesh.field.camera import axes
 
 Floats = NDArray[np.float64]
@@ -63,18 +64,8 @@ def head_light(normals: Floats, yaw_deg: float, pitch_deg: float) -> Floats:
 
 def lit(colours: Floats, light: Floats) -> Floats:
     """(N, 3) sRGB 0-255 of surfaces of these colours (N, 3) in so much linear light (N,)."""
-    return encode(np.minimum(decode(colours) * light[:, None], 1.0))
-
-
-def decode(colours: Floats) -> Floats:
-    """Linear light 0-1 of sRGB 0-255, not rounded to bytes."""
-    srgb = colours / 255.0
-    return np.asarray(np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4))
-
-
-def encode(linear: Floats) -> Floats:
-    """sRGB 0-255 of linear light 0-1, not rounded to bytes."""
-    return 255.0 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    linear = linear_from_srgb(colours / 255.0) * light[:, None]
+    return 255.0 * srgb_from_linear(np.minimum(linear, 1.0))
 
 
 def hemisphere(normals: Floats, count: int, turns: Floats) -> Floats:

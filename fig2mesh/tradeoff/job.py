@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import platform
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from exporters.atomic_file import sweep_temporary, write_whole
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.evaluate.figures import Drawing, drawing_in
 from fig2mesh.field.body import Body
@@ -15,6 +15,9 @@ from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
 
 Say = Callable[[str], None]
+
+PAGE = "README.md"
+"""It names the other files, and so is put in place last."""
 
 
 def drawings_of(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Drawing]:
@@ -43,15 +46,11 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
     from fig2mesh.tradeoff.sweep import requests, sweep
     from fig2mesh.tradeoff.tolerance import tolerances
 
+    sweep_temporary(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not overwrite:
         raise OutputError(folder, "exists and is not an empty folder", "pass --overwrite or another folder")
-    partial = folder.with_name(f".{folder.name}.partial")
-    shutil.rmtree(partial, ignore_errors=True)
-    try:
-        partial.mkdir(parents=True)
-    except OSError as error:
-        raise OutputError(folder, error.strerror or "cannot be made", "choose another folder") from None
-    try:
+
+    def fill(stage: Path) -> None:
         table, pages = [], []
         count = sum(1 for _ in requests(knobs))
         for files in figures:
@@ -67,18 +66,15 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
                     say(f"{files.name}: errors are measured against this one")
                 found.append(measure(run, finest))
             table += rows(files.name, found)
-            plot(found, partial, files.name)
+            plot(found, stage, files.name)
             pages.append(summary(files.name, found, tolerances(_body(files)), _machine()))
         head = (
             "# What accuracy costs\n\nWritten by `fig2mesh tradeoff`; the numbers are in [tradeoff.csv](tradeoff.csv)."
         )
-        (partial / "README.md").write_text("\n\n".join([head, *pages]), encoding="utf-8")
-        (partial / "tradeoff.csv").write_text(as_csv(table), encoding="utf-8")
-        folder.mkdir(parents=True, exist_ok=True)
-        for path in sorted(partial.iterdir()):
-            os.replace(path, folder / path.name)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        (stage / PAGE).write_text("\n\n".join([head, *pages]), encoding="utf-8")
+        (stage / "tradeoff.csv").write_text(as_csv(table), encoding="utf-8")
+
+    write_whole(folder, folder / PAGE, fill, overwrite)
 
 
 def _body(files: Drawing) -> Body:

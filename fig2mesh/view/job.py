@@ -47,7 +47,7 @@ def run(request: ViewRequest, quiet: bool = False) -> None:
         there = placed.placement
         page = view_page(scene, wanted) if there is None else globe_page(scene, there, f"{CESIUM}/", wanted)
     if request.output is not None:
-        write_text(request.output, page, "name")
+        write_text(request.output, page, "-o")
         log.info("%s: %.1f MB", request.output, len(page) / 1e6)
         return
     show(page_server(page, request.port, folders), request.open)
@@ -70,7 +70,7 @@ def _check(request: ViewRequest) -> None:
     if output is not None:
         if output.suffix.lower() not in (".html", ".htm"):
             raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
-        check_text(output, request.overwrite, "-o", "name")
+        check_text(output, request.overwrite, "-o")
     if request.cesium is not None and (not request.somewhere or output is not None):
         raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
 

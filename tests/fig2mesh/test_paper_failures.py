@@ -193,7 +193,7 @@ def runs(figure: Assembled, row: float, left: float, right: float) -> int:
 def test_every_drawing_is_a_sound_solid_of_as_many_pieces_as_drawn(drawing: Callable[[], Assembled]) -> None:
     figure = made(drawing)
     found = check_solid(figure.mesh)
-    assert found.solid, "closed, oriented and manifold, and nothing inside out"
+    assert found.outward, "closed, oriented and manifold, and nothing inside out"
     assert ndimage.label(figure.figure.mask, np.ones((3, 3)))[1] == (2 if drawing in TWO_PIECES else 1)
     assert found.components == (2 if drawing in TWO_PIECES else 1)
     assert inner_shells(figure.mesh) == 0

@@ -118,7 +118,7 @@ def test_meshes_of_fields_that_overestimate(worst: Worst, seed: int) -> None:
     rng = np.random.default_rng(seed)
     body = Body(tuple(overestimating(part, rng) for part in (ball(48), limb(48))))
     mesh = isosurface(body, spacing=0.02)
-    assert check_solid(mesh).solid
+    assert check_solid(mesh).outward
     worst(np.abs(body.distance(mesh.vertices)).max())
 
 
@@ -163,7 +163,7 @@ def test_all_negative_grids(worst: Worst, seed: int, exponent: int, edge: float)
     assert np.abs(hits.depth - (3.0 - edge / 2)).max() < 1e-6
     assert np.isfinite(hits.normals).all()
     report = check_solid(isosurface(body, spacing=edge / 12))
-    assert report.solid
+    assert report.outward
     assert report.components == 1
     worst(abs(report.volume / edge**3 - 1))
 
@@ -222,7 +222,7 @@ def test_coincident_parts(seed: int, copies: int) -> None:
     assert np.isfinite(melted.distance(rays.origins)).all()
     for body in (many, melted):
         report = check_solid(isosurface(body, spacing=0.05))
-        assert report.solid
+        assert report.outward
         assert report.components == 1
 
 

@@ -32,7 +32,7 @@ WHY = (
 def one_solid(figure: Figure, worst: Worst) -> None:
     made = solid_of(figure)
     report = check_solid(made.mesh)
-    assert report.solid
+    assert report.outward
     assert report.components == 1
     worst(1 - made.front_iou())
 

@@ -43,8 +43,7 @@ def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> t
     soup = read_soup(path)
     mesh, visible = solidify(soup.corners, voxel)
     mesh = simplify(mesh, faces)
-    report = check_solid(mesh)
-    if not report.solid:
+    if not check_solid(mesh).outward:
         raise InputError(str(path), "its pieces make no closed body", "leave this character out")
     return bind(path.stem, mesh, soup, visible), soup.colours
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.atomic_file import atomic_path
 from fig2mesh.errors import FigureError
 from fig2mesh.training.bodies.anny_body import AnnyBodies, read_anny
 from fig2mesh.training.bodies.garments import Garment, read_garments
@@ -83,9 +83,8 @@ def save_pack(pack: Pack, path: Path) -> None:
     _store(arrays, "training_poses", pack.training_poses)
     _store(arrays, "held_out_poses", pack.held_out_poses)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.partial.npz")
-    np.savez_compressed(partial, **arrays)
-    os.replace(partial, path)
+    with atomic_path(path) as partial:
+        np.savez_compressed(partial, **arrays)
 
 
 def load_pack(path: Path) -> Pack:

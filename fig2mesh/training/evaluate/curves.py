@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+from exporters.atomic_file import atomic_path
+
 
 def plot_runs(runs: Path, out: Path) -> bool:
     """Draw the scores on held-out bodies of all runs under a folder over the samples seen; False where there are none.
@@ -39,8 +41,7 @@ def plot_runs(runs: Path, out: Path) -> bool:
         pyplot.close(figure)
         return False
     figure.tight_layout()
-    partial = out.with_name(f".partial-{out.name}")
-    figure.savefig(partial, dpi=80)
+    with atomic_path(out) as partial:
+        figure.savefig(partial, dpi=80)
     pyplot.close(figure)
-    partial.replace(out)
     return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
+from exporters.atomic_file import atomic_path
 from fig2mesh.errors import InputError
 
 CHECKPOINT = "checkpoint.pt"
@@ -53,9 +53,8 @@ def save_checkpoint(
         "sums": state.sums,
         "summed": state.summed,
     }
-    part = folder / (CHECKPOINT + ".part")
-    torch.save(content, part)
-    os.replace(part, folder / CHECKPOINT)
+    with atomic_path(folder / CHECKPOINT) as partial:
+        torch.save(content, partial)
 
 
 def resume(

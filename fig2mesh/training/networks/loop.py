@@ -23,6 +23,7 @@ import torch
 from torch import Tensor, nn
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
+from exporters.atomic_file import sweep_temporary
 from fig2mesh.training.networks.checkpoint import Argument, State, resume, save_checkpoint
 from fig2mesh.training.networks.run_log import CURVE, LOG, draw_curve, write_log
 from fig2mesh.training.networks.schedule import Schedule
@@ -134,6 +135,7 @@ def run_loop(
         **task.arguments,
     }
     folder.mkdir(parents=True, exist_ok=True)
+    sweep_temporary(folder)
     state = State(torch.Generator().manual_seed(schedule.seed), _copy(model))
     resume(folder, identity, model, optimizer, state)
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
+
+from exporters.atomic_file import atomic_path, atomic_text, write_text
 
 LOG = "log.csv"
 
@@ -20,19 +21,15 @@ SCORES = "scores.json"
 def write_log(path: Path, rows: list[dict[str, float]]) -> None:
     """Write the rows as CSV, one column a name; replaced as a whole, so that no row of a lost step remains."""
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    part = path.with_name(path.name + ".part")
-    with part.open("w", newline="", encoding="utf-8") as stream:
+    with atomic_text(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows([f"{row[name]:.6g}" if name in row else "" for name in columns] for row in rows)
-    os.replace(part, path)
 
 
 def write_scores(folder: Path, scores: Mapping[str, float]) -> None:
     """Write the scores of a finished run, whole or not at all."""
-    part = folder / (SCORES + ".part")
-    part.write_text(json.dumps(dict(scores), indent=1) + "\n", encoding="utf-8")
-    os.replace(part, folder / SCORES)
+    write_text(folder / SCORES, json.dumps(dict(scores), indent=1) + "\n")
 
 
 def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
@@ -60,4 +57,5 @@ def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
             axes.set_yscale("log")
         axes.set_title(title, fontsize="small")
         axes.legend(fontsize="x-small")
-    figure.savefig(path, dpi=80)
+    with atomic_path(path) as partial:
+        figure.savefig(partial, dpi=80)

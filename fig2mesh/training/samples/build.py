@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import zipfile
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.atomic_file import atomic_path, sweep_temporary, write_text
 from fig2mesh.errors import FigureError
 from fig2mesh.training.bodies.pack import Pack, load_pack
 from fig2mesh.training.bodies.subject import SPLITS, draw_subject
@@ -72,6 +72,7 @@ def build(
             path = out / f"{split}-{index:05d}.npz"
             if not _complete(path, len(rows)):
                 tasks.append((str(pack), split, rows, seed, pictures, shapes, path))
+    sweep_temporary(out)
     make_shards(_shard, tasks, jobs, report)
 
 
@@ -110,9 +111,7 @@ def _check_recipe(out: Path, recipe: dict[str, Any]) -> None:
             raise FigureError(out, "holds data of another recipe", "choose another folder or remove this one")
         return
     out.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{RECIPE}.partial")
-    partial.write_text(json.dumps(recipe, indent=2) + "\n", encoding="utf-8")
-    os.replace(partial, path)
+    write_text(path, json.dumps(recipe, indent=2) + "\n")
 
 
 def _complete(path: Path, rows: int) -> bool:
@@ -144,7 +143,6 @@ def _shard(pack: str, split: str, rows: range, seed: int, pictures: bool, shapes
         arrays |= {"character": subject.character, "clip": subject.clip, "seed": number}
         for name, value in arrays.items():
             columns.setdefault(name, []).append(value)
-    partial = path.with_name(f".{path.stem}.partial.npz")
     stacked: dict[str, Any] = {name: np.asarray(values) for name, values in columns.items()}
-    np.savez_compressed(partial, **stacked)
-    os.replace(partial, path)
+    with atomic_path(path) as partial:
+        np.savez_compressed(partial, **stacked)

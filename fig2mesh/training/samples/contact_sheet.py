@@ -6,7 +6,6 @@ depth of the front; visible masks of some parts; its skeleton.
 
 from __future__ import annotations
 
-import os
 import zipfile
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.atomic_file import atomic_path
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.skeleton import BODY_PARTS, BONES, JOINT, PART
@@ -49,9 +49,8 @@ def make_sheet(data: Path, out: Path, count: int = 24) -> Path:
     out = Path(out)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        partial = out.with_name(f".{out.name}.partial")
-        Image.fromarray(np.clip(np.rint(sheet), 0, 255).astype(np.uint8)).save(partial, format="PNG")
-        os.replace(partial, out)
+        with atomic_path(out) as partial:
+            Image.fromarray(np.clip(np.rint(sheet), 0, 255).astype(np.uint8)).save(partial, format="PNG")
     except (OSError, ValueError) as error:
         raise OutputError(
             out, f"the sheet cannot be written ({error})", "name a .png file in a folder of yours"

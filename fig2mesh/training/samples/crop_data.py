@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.atomic_file import atomic_path, sweep_temporary, write_text
 from fig2mesh.errors import FigureError
 from fig2mesh.training.bodies.pack import Pack, load_pack
 from fig2mesh.training.bodies.subject import SPLITS
@@ -77,6 +77,7 @@ def build_crops(
                     rows = range(first, min(first + step, count[kind]))
                     tasks.append((str(pack), kind, split, rows, seed, path))
     tasks.sort(key=lambda task: task[2] == "train")
+    sweep_temporary(out)
     make_shards(_shard, tasks, jobs, report)
 
 
@@ -113,7 +114,7 @@ def _check_recipe(out: Path, recipe: dict[str, Any]) -> None:
             raise FigureError(out, "holds crops of another recipe", "choose another folder or remove this one")
         return
     out.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _shard(pack: str, kind: str, split: str, rows: range, seed: int, path: Path) -> None:
@@ -133,7 +134,6 @@ def _shard(pack: str, kind: str, split: str, rows: range, seed: int, path: Path)
     else:
         doodler = Doodler(_PACK[pack], split)
         made = doodler.draw(len(rows), np.random.default_rng([11, SPLITS.index(split), seed, rows.start]))
-    partial = path.with_name(f".{path.stem}.partial.npz")
     columns: dict[str, Any] = {name: np.stack([getattr(crop, name) for crop in made]) for name in FIELDS}
-    np.savez_compressed(partial, **columns)
-    os.replace(partial, path)
+    with atomic_path(path) as partial:
+        np.savez_compressed(partial, **columns)

@@ -101,14 +101,14 @@ def test_a_rerun_does_no_work(collection: Path, converted: Path, capsys: pytest.
 def test_what_a_killed_run_had_not_put_in_place_goes(collection: Path, converted: Path) -> None:
     half = [
         converted / ".fig2mesh-1-abcd.tmp" / "half.json",
-        converted / WORK / "stages" / "00" / ".ab.partial.npz",
-        converted / WORK / "records" / "00" / ".cd.partial",
+        converted / WORK / "stages" / "00" / ".fig2mesh-2-ab.tmp" / "half.npz",
+        converted / WORK / "records" / "00" / ".fig2mesh-3-cd.tmp" / "half.json",
     ]
     for path in half:
-        path.parent.mkdir(exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     assert main(["batch", str(collection), "-o", str(converted), "-q"]) == 2
-    assert not any(path.exists() for path in half)
+    assert not any(path.parent.exists() for path in half)
 
 
 def test_one_worker_and_another_order_of_ends_give_the_same_bytes(

@@ -106,7 +106,7 @@ def closed(name: str) -> Mesh:
 def assert_solid(mesh: Mesh, components: int = 1, genus: int = 0) -> None:
     """The law of this folder: closed, oriented, manifold, and the body's own pieces and handles."""
     report = check_solid(mesh)
-    assert report.solid, report
+    assert report.outward, report
     assert (report.components, report.genus) == (components, genus)
     judge = Manifold(ManifoldMesh(mesh.vertices.copy(), mesh.faces.astype(np.uint32)))
     assert judge.status() == Error.NoError

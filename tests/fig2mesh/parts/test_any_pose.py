@@ -62,7 +62,7 @@ def test_every_figure_is_one_closed_solid_with_the_drawn_silhouette(drawn: Drawn
     _, pieces = ndimage.label(drawn.figure.mask, np.ones((3, 3)))
     made = assemble(drawn.figure, drawn.depths, canvas_px=192, voxel=0.015)
     found = check_solid(made.mesh)
-    assert found.solid, "closed, oriented and manifold, and nothing inside out"
+    assert found.outward, "closed, oriented and manifold, and nothing inside out"
     assert found.components == pieces == 1
     # A canvas of 192 pixels knows the contour to about 0.002 units; the thinnest limb is 0.06 units wide.
     assert made.front_iou() > 0.95

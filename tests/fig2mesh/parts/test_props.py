@@ -49,7 +49,7 @@ def of_part(figure: Assembled, part: str) -> NDArray[np.float64]:
 @pytest.mark.parametrize("depth", [-0.2, 0.0, 0.25])
 def test_a_staff_is_a_rod_in_the_hand_that_holds_it(depth: float) -> None:
     figure = staff(depth)
-    assert check_solid(figure.mesh).solid
+    assert check_solid(figure.mesh).outward
     assert check_solid(figure.mesh).components == 1
     assert inner_shells(figure.mesh) == 0
     assert figure.front_iou() > 0.97

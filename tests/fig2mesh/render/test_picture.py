@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from skimage.metrics import structural_similarity
 
+from exporters.colour import linear_from_srgb, srgb_from_linear
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import axes
 from fig2mesh.parts.smooth_union import smooth_union
@@ -21,8 +22,6 @@ from fig2mesh.render.shading import (
     CLAY,
     FILL,
     KEY,
-    decode,
-    encode,
     fill_direction,
     hemisphere,
     key_direction,
@@ -65,12 +64,12 @@ def test_ball_in_a_known_light_is_lambert(yaw: float, pitch: float) -> None:
     normals = ball_normals(request, scene, 0.5)
     lamp, fill = key_direction(yaw), fill_direction(yaw)
     light = AMBIENT + FILL * (0.5 + 0.5 * normals @ fill) + KEY * np.maximum(normals @ lamp, 0)
-    linear = np.minimum(decode(np.array(CLAY)) * light[..., None], 1)
+    linear = np.minimum(linear_from_srgb(np.array(CLAY) / 255) * light[..., None], 1)
     picture = render(scene, request).rgba
     inside = (picture[..., 3] == 255) & (normals @ axes(yaw, pitch)[2] > 0.15)
     assert inside.sum() > 5000
     # The grid of 96 nodes knows a ball's normal to a third of a degree.
-    assert np.abs(picture[inside][:, :3] - encode(linear[inside])).max() <= 2.0
+    assert np.abs(picture[inside][:, :3] - 255 * srgb_from_linear(linear[inside])).max() <= 2.0
 
 
 def test_lamp_stays_at_the_viewers_upper_left() -> None:
@@ -88,7 +87,7 @@ def test_light_is_added_linearly() -> None:
     """Half of the light is sRGB 188 on white, not 128."""
     assert lit(np.full((1, 3), 255.0), np.array([0.5]))[0, 0] == pytest.approx(187.5, abs=0.1)
     colours = np.arange(0.0, 255.5, 0.5)
-    assert np.allclose(encode(decode(colours)), colours, atol=1e-4)
+    assert np.allclose(255 * srgb_from_linear(linear_from_srgb(colours / 255)), colours, atol=1e-4)
 
 
 def test_shadow_of_a_ball_lies_where_geometry_says() -> None:
@@ -126,7 +125,8 @@ def test_ambient_occlusion_of_a_plane_is_one_and_of_a_corner_a_half() -> None:
     size = (120, 120)
     request = Request("clay", frozenset(["ao"]), size, pitch_deg=90.0)
     bare, shaded = (render(scene, replace(request, effects=effects)).rgba for effects in (frozenset(), request.effects))
-    openness = decode(shaded[..., 0].astype(float)) / np.maximum(decode(bare[..., 0].astype(float)), 1e-9)
+    lit_by, unshaded = linear_from_srgb(shaded[..., 0] / 255), linear_from_srgb(bare[..., 0] / 255)
+    openness = lit_by / np.maximum(unshaded, 1e-9)
     pixel = view_of(scene, request).camera.height / size[1]
     z = (np.arange(size[1]) + 0.5 - size[1] / 2) * pixel + scene.bounds.mean(axis=0)[2]
     reach = AO_REACH * (scene.bounds[1, 1] - scene.bounds[0, 1])

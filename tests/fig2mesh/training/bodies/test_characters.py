@@ -173,7 +173,7 @@ def stick_man(tmp_path_factory: pytest.TempPathFactory) -> tuple[Rig, NDArray[np
 
 def _check_rig(rig: Rig) -> None:
     report = check_solid(Mesh(rig.vertices, rig.faces))
-    assert report.solid
+    assert report.outward
     assert report.components == 1
     assert np.ptp(rig.vertices[:, 1]) == pytest.approx(FIGURE_HEIGHT, abs=0.03)
     np.testing.assert_allclose(rig.bone_weight.sum(axis=1), 1, atol=1e-5)
@@ -240,7 +240,7 @@ def test_loose_pieces_and_sheets_join_the_body() -> None:
     sheet = np.array([[[-0.1, 0.15, 0], [0.1, 0.15, 0], [0, 0.5, 0]]])
     mesh, visible = solidify(np.concatenate([ball[faces], other[faces], sheet]), 0.015)
     report = check_solid(mesh)
-    assert report.solid
+    assert report.outward
     assert report.components == 1
     assert report.genus == 0
     assert mesh.vertices[:, 0].max() == pytest.approx(0.6, abs=0.015)
