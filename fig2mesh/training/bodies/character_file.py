@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.colour import srgb_from_linear
 from fig2mesh.errors import InputError
 from fig2mesh.skeleton import FIGURE_HEIGHT
 from fig2mesh.training.bodies.gltf_scene import GltfScene, read_gltf
@@ -106,7 +107,7 @@ def read_soup(path: Path) -> Soup:
     real = np.linalg.norm(np.cross(shape[:, 1] - shape[:, 0], shape[:, 2] - shape[:, 0]), axis=1) > 1e-12
     scale = FIGURE_HEIGHT / np.ptp(shape[..., 1])
     linear = np.array(list(found.values()))
-    srgb = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    srgb = srgb_from_linear(linear)
     return Soup(
         shape[real] * scale,
         np.concatenate(weights)[real],
