@@ -19,7 +19,6 @@ from exporters.gltf.container import open_glb
 from exporters.gltf.reader import Gltf
 from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
 from exporters.tiles.b3dm import part_table
-from georef.errors import InputError
 from georef.geodesy import tile_from_asset
 
 SAME_PLACE_M = 1e-3
@@ -88,8 +87,6 @@ def read_figure(path: Path) -> PlacedFigure:
             observed=_observed(gltf, np.array(shares)) if shares else None,
         )
     except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
         raise ExportError(path, f"broken glTF ({' '.join(str(error).split())[:120]})", "see validate") from error
 
 
@@ -141,8 +138,6 @@ def _tileset(path: Path, chain: frozenset[Path], read: set[Path]) -> Iterator[Pl
     try:
         yield from _tiles(document["root"], path, chain | {path.resolve()}, read)
     except DAMAGE as error:
-        if isinstance(error, InputError):
-            raise
         reason = " ".join(str(error).split())[:120]
         raise ExportError(path, f"broken tileset ({type(error).__name__}: {reason})", "see validate") from error
 

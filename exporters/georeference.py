@@ -51,6 +51,9 @@ def placement_of_tile(transform: ArrayLike) -> dict[str, float]:
     """
     matrix = np.asarray(transform, dtype=np.float64).reshape(4, 4).T
     ecef_from_tile = Transform(ECEF, TILE, matrix)
-    lon, lat, height = geodetic_from_ecef(matrix[:3, 3]).tolist()
+    try:
+        lon, lat, height = geodetic_from_ecef(matrix[:3, 3]).tolist()
+    except PlacementError as error:
+        raise ValueError(str(error)) from error
     bearing = nose_bearing_deg(ecef_from_tile)
     return {"lon_deg": lon, "lat_deg": lat, "height_m": height, "heading_deg": bearing}

@@ -21,6 +21,7 @@ from exporters.texture_files import texture_size
 from exporters.tiles.check import read_tileset
 from exporters.usd.process import usd_facts_apart
 from exporters.validate import read_triangles
+from georef.errors import PlacementError
 
 
 def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -39,9 +40,9 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ExportError(path, "is not there", "check the name")
     try:
         found = _inspect_any(path)
-    except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
+    except ExportError:
+        raise
+    except (PlacementError, *DAMAGE) as error:
         # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
         reason = " ".join(str(error).split())[:120]
         raise ExportError(path, f"damaged ({type(error).__name__}: {reason})", "see fig2mesh validate") from error

@@ -16,6 +16,7 @@ from exporters.solid import merged_by_position
 from exporters.tiles.check import check_tileset
 from exporters.triangle_files import check_triangle_file, references_of
 from exporters.usd.process import check_usd_apart
+from georef.errors import PlacementError
 from georef.untrusted.json_file import is_there
 
 __all__ = ["Finding", "read_triangles", "validate"]
@@ -34,9 +35,9 @@ def validate(path: str | os.PathLike[str], external: bool = True) -> list[Findin
         raise ExportError(path, "is not there", "check the name")
     try:
         findings = _check_any(path, external)
-    except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
+    except ExportError:
+        raise
+    except (PlacementError, *DAMAGE) as error:
         # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
         reason = " ".join(str(error).split())[:120]
         findings = [Finding("error", "DAMAGED", f"{type(error).__name__}: {reason}", path.name)]

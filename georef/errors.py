@@ -21,7 +21,7 @@ def one_line(text: str) -> str:
     return text if len(text) <= MOST_CHARACTERS else f"{text[:half]}…{text[-half:]}"
 
 
-class InputError(ValueError):
+class InputError(Exception):
     """Input that cannot be used: names the input, the finding and the remedy.
 
     Parameters

@@ -18,6 +18,7 @@ from typing import Any
 
 from exporters.errors import DAMAGE, ExportError
 from exporters.findings import Finding
+from georef.errors import PlacementError
 
 TIMEOUT_S = 300
 """Of large stages the validators of USD take a minute."""
@@ -67,7 +68,7 @@ def _answer(question: str, path: Path) -> dict[str, Any]:
         return {"found": found}
     except ExportError as error:
         return {"error": {"finding": error.finding, "remedy": error.remedy}}
-    except DAMAGE as error:
+    except (PlacementError, *DAMAGE) as error:
         reason = " ".join(str(error).split())[:120]
         return {"error": {"finding": f"damaged ({type(error).__name__}: {reason})", "remedy": "write it again"}}
 

@@ -86,8 +86,6 @@ def _read(path: Path) -> GlobeAsset:
         json.dumps(found.facts, allow_nan=False)  # files may hold numbers that no page can
         return found
     except DAMAGE as error:
-        if isinstance(error, InputError):
-            raise
         reason = " ".join(str(error).split())[:120]
         raise InputError(path, f"damaged ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
 

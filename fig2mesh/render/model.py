@@ -34,8 +34,6 @@ def read_model(path: Path) -> TexturedMesh:
         mesh = load_textured(path)
         labels = _gltf_labels(gltf)
     except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
         reason = " ".join(str(error).split())[:120]
         raise ExportError(path, f"broken glTF ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
     return replace(mesh, parts=labels) if labels is not None and len(labels) == len(mesh.vertices) else mesh

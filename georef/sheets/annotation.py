@@ -69,8 +69,6 @@ def read_annotation(path: Path) -> Controls:
 def _parsed(path: Path) -> Any:
     try:
         return parse_json(read_text(path))
-    except PlacementError:
-        raise
     except ValueError as error:
         raise PlacementError(path, str(error), "give a IIIF Georeference annotation") from None
 

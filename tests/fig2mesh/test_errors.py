@@ -1,0 +1,16 @@
+"""What the kinds of errors say of themselves."""
+
+from __future__ import annotations
+
+import pytest
+
+from exporters.errors import ExportError
+from fig2mesh.errors import FigureError, InputError, OutputError
+from georef.errors import PlacementError
+
+KINDS = (InputError, FigureError, OutputError, PlacementError, ExportError)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_handler_of_wrong_values_takes_an_unusable_input_for_one(kind: type[InputError]) -> None:
+    assert not issubclass(kind, ArithmeticError | LookupError | TypeError | ValueError)
