@@ -6,11 +6,12 @@ import struct
 import zlib
 
 from georef.errors import InputError
+from georef.untrusted.damage import DamagedFile
 
 # fmt: off
 DAMAGE: tuple[type[Exception], ...] = (
-    ArithmeticError, AttributeError, EOFError, LookupError, RecursionError, SyntaxError, TypeError, ValueError,
-    struct.error, zlib.error,
+    DamagedFile, struct.error, zlib.error, ArithmeticError, AttributeError, EOFError, LookupError, RecursionError,
+    SyntaxError, TypeError, ValueError,
 )
 # fmt: on
 """What code that looks into files from elsewhere raises where they are damaged: in more ways than can be listed."""

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from exporters.errors import ExportError
-from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.image_file import check_head
 from georef.untrusted.json_file import is_there, read_bytes
 
 MAX_TRIANGLE_BYTES = 256 << 20
@@ -61,22 +62,15 @@ def check_triangle_file(path: Path) -> None:
         try:
             data = read_bytes(target, limit)
             if word == "map_Kd":
-                _check_picture(data)
-        except (OSError, ValueError) as error:
+                check_head(data)
+        except (OSError, DamagedFile) as error:
             raise ExportError(file, f"{word} {name[:80]}: {error}", "give the model with its own files") from None
-
-
-def _check_picture(data: bytes) -> None:
-    with opened(data) as image:
-        if image.width * image.height > MAX_TEXTURE_PX:
-            raise ValueError(f"{image.width} x {image.height} px are too many")
-        check_scans(image, data)
 
 
 def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
     try:
         data = read_bytes(file, limit)
-    except (OSError, ValueError) as error:
+    except (OSError, DamagedFile) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise ExportError(file, reason, "give the model with its own files") from None
     known = set()

@@ -19,7 +19,7 @@ from exporters.findings import Finding, as_infos, check_place, check_solid
 from exporters.gltf.khronos import khronos_findings
 from exporters.gltf.ktx2 import size_of
 from exporters.gltf.reader import MESHOPT, Gltf, NotReadHere, read_gltf
-from exporters.texture_files import MAX_TEXTURE_PX, TooLarge, check_texture
+from georef.untrusted.image_file import MAX_TEXTURE_PX, TooLarge, check_texture
 
 UNIT_TOLERANCE = 5e-4
 """How far a normal's length may be from 1; the Khronos validator allows about as much."""

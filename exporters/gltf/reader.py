@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from exporters.errors import DAMAGE, ExportError
 from exporters.gltf import meshopt
 from exporters.solid import merged_by_position
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json, read_bytes
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -268,8 +269,8 @@ def _resource(path: Path, uri: str) -> bytes:
         return read_bytes(path.parent / unquote(uri), MAX_BYTES)
     except OSError as error:
         raise ValueError(f"{uri[:80]} is not there ({error.strerror})") from error
-    except ValueError as error:
-        raise ValueError(f"{uri[:80]}: {error}") from error
+    except DamagedFile as error:
+        raise DamagedFile(f"{uri[:80]}: {error}") from error
 
 
 def read_gltf(path: Path | str) -> Gltf:

@@ -20,6 +20,7 @@ import numpy as np
 from exporters.errors import ExportError
 from exporters.gltf.container import glb_of
 from exporters.gltf.reader import Gltf
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 HEADER = struct.Struct("<4sIIIIII")
@@ -187,19 +188,19 @@ class B3dm:
 
 
 def read_b3dm(data: bytes) -> B3dm:
-    """Take a batched 3D model apart. Raises ValueError where header, lengths or alignment break the rules."""
+    """Take a batched 3D model apart. Raises DamagedFile where header, lengths or alignment break the rules."""
     if len(data) < HEADER.size:
-        raise ValueError(f"{len(data)} bytes, less than the header")
+        raise DamagedFile(f"{len(data)} bytes, less than the header")
     magic, version, total, *lengths = HEADER.unpack_from(data)
     if magic != b"b3dm" or version != 1:
-        raise ValueError(f"starts with {magic!r} version {version}, expected b'b3dm' version 1")
+        raise DamagedFile(f"starts with {magic!r} version {version}, expected b'b3dm' version 1")
     if total != len(data) or sum(lengths) + HEADER.size > total:
-        raise ValueError(f"header says {total} bytes with tables of {lengths}, file has {len(data)}")
+        raise DamagedFile(f"header says {total} bytes with tables of {lengths}, file has {len(data)}")
     ends = [HEADER.size + end for end in itertools.accumulate(lengths)]
     if total % 8 or ends[1] % 8 or ends[3] % 8:
-        raise ValueError(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
+        raise DamagedFile(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
     feature_table = parse_json(data[HEADER.size : ends[0]])
     batch_table = parse_json(data[ends[1] : ends[2]]) if lengths[2] else {}
     if not isinstance(feature_table, dict) or not isinstance(batch_table, dict):
-        raise ValueError("a table is no JSON object")
+        raise DamagedFile("a table is no JSON object")
     return B3dm(feature_table, batch_table, data[ends[3] :])

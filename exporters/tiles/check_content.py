@@ -16,6 +16,7 @@ from exporters.gltf.check import check_gltf
 from exporters.gltf.reader import MAX_BYTES, read_gltf
 from exporters.tiles.b3dm import B3dm, read_b3dm
 from georef.geodesy import tile_from_asset
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import read_bytes
 
 UNCHECKED = {
@@ -84,7 +85,7 @@ def _mesh(file: Path, findings: tuple[Finding, ...], up_axis: str) -> Content:
 def _b3dm(file: Path, external: bool, up_axis: str) -> Content:
     try:
         tile = read_b3dm(read_bytes(file, MAX_BYTES))
-    except (OSError, ValueError) as error:
+    except (OSError, DamagedFile) as error:
         return Content("mesh", (Finding("error", "B3DM", str(error), file.name),))
     with tempfile.TemporaryDirectory(prefix="fig2mesh-") as folder:
         inner = Path(folder) / f"{file.name}.glb"

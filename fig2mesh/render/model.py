@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from exporters.asset import TexturedMesh
 from exporters.errors import DAMAGE, ExportError
 from exporters.gltf.reader import MESHOPT, Gltf, read_gltf
-from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
 from fig2mesh.measure.model import load_textured
+from georef.untrusted.image_file import check_head
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
 """Files that are models; everything else is taken for a drawing."""
@@ -45,11 +45,7 @@ def _check_costs(gltf: Gltf) -> None:
     for index in range(len(gltf.items("accessors"))):
         gltf.accessor(index)
     for index in range(len(gltf.items("images"))):
-        data = gltf.image(index)
-        with opened(data) as image:
-            if image.width * image.height > MAX_TEXTURE_PX:
-                raise ValueError(f"image {index} has {image.width} x {image.height} px")
-            check_scans(image, data)
+        check_head(gltf.image(index))
 
 
 def _gltf_labels(gltf: Gltf) -> NDArray[np.uint8] | None:
