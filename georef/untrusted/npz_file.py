@@ -75,7 +75,7 @@ def _head(stream: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         shape, fortran, dtype = read(file)
     if any(side < 0 for side in shape):
         raise DamagedFile(f"a shape of {shape}")
-    return shape, fortran, dtype
+    return tuple(map(int, shape)), fortran, dtype  # numpy lets true and false pass for sides
 
 
 def text_of(array: NDArray[Any]) -> str:

@@ -161,7 +161,7 @@ def test_rows_that_overlap_and_nodes_with_two_parents(tmp_path: Path) -> None:
         "scenes": [{"nodes": [0]}],
     }
     path = glb(tmp_path / "a.glb", document, bytes(36))
-    with pytest.raises(ValueError, match="rows of 12 bytes every 1"):
+    with pytest.raises(DamagedFile, match="rows of 12 bytes every 1"):
         read_gltf(path).accessor(0)
     with pytest.raises(ExportError, match="two parents"):
         inspect(path)

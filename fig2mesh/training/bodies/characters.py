@@ -20,7 +20,7 @@ from fig2mesh.errors import InputError
 from fig2mesh.mesh.simplify import simplify
 from fig2mesh.mesh.topology import check_solid, edge_pairs
 from fig2mesh.records import JOINT_NAMES, PART, PART_NAMES, Mesh
-from fig2mesh.training.bodies.gltf_scene import GltfScene, read_gltf
+from fig2mesh.training.bodies.gltf_scene import GltfScene, read_scene
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, Rig
 from fig2mesh.training.bodies.solidify import Surface, solidify
 
@@ -96,7 +96,7 @@ def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> t
 # ---------------------------------------------------------------- reading
 def read_soup(path: Path) -> Soup:
     """Every skinned triangle of a character file in rest pose, scaled to `HEIGHT`."""
-    scene = read_gltf(path)
+    scene = read_scene(path)
     names, parents, bone_of = _skeleton(scene, path)
     placed = scene.global_matrices()
     heads = placed[[scene.names.index(name) for name in names], :3, 3]

@@ -1,4 +1,4 @@
-"""What PLY and OBJ files say before they are read by trimesh: their size, and the files that they name.
+"""PLY and OBJ files: what they say of their size and of further files, and their triangles as trimesh reads them.
 
 http://paulbourke.net/dataformats/obj/ and http://paulbourke.net/dataformats/mtl/
 """
@@ -8,6 +8,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from exporters.errors import ExportError
 from georef.untrusted.damage import DamagedFile
@@ -82,3 +85,20 @@ def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
         if word == keyword and name not in known and "\0" not in name:
             known.add(name)
             yield file, word, name, file.parent / name
+
+
+def read_triangles(path: Path) -> Any:
+    """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
+    import trimesh
+
+    check_triangle_file(path)
+    try:
+        mesh = trimesh.load_mesh(str(path), process=False)
+    except Exception as error:  # trimesh lets whatever its parsers meet through
+        raise ExportError(path, f"cannot be read ({error})", "write it again") from error
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise ExportError(path, "holds no single triangle mesh", "write it again")
+    faces = np.asarray(mesh.faces)
+    if faces.min() < 0 or faces.max() >= len(mesh.vertices):
+        raise ExportError(path, "has triangles of vertices that are not there", "write it again")
+    return mesh
