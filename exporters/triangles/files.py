@@ -98,7 +98,9 @@ def read_triangles(path: Path) -> Any:
         raise ExportError(path, f"cannot be read ({error})", "write it again") from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise ExportError(path, "holds no single triangle mesh", "write it again")
-    faces = np.asarray(mesh.faces)
-    if faces.min() < 0 or faces.max() >= len(mesh.vertices):
+    faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
+    if vertices.shape[1:] != (3,):
+        raise ExportError(path, "has vertices of other than 3 coordinates", "write it again")
+    if faces.min() < 0 or faces.max() >= len(vertices):
         raise ExportError(path, "has triangles of vertices that are not there", "write it again")
     return mesh

@@ -78,6 +78,8 @@ def _answer(question: str, path: Path) -> dict[str, Any]:
         return {"error": {"finding": error.finding, "remedy": error.remedy}}
     except (DamagedFile, PlacementError) as error:
         return {"error": {"finding": f"damaged ({error})", "remedy": "write it again"}}
+    except OSError as error:  # also of places in a package that no file can have
+        return {"error": {"finding": error.strerror or "cannot be read", "remedy": "write it again"}}
     except Exception as error:
         return {"fault": f"{type(error).__name__}: {error}", "where": traceback.format_exc()}
 

@@ -16,7 +16,7 @@ from urllib.parse import SplitResult, unquote, urlsplit
 
 from exporters.georeference import placement_of_record
 from exporters.gltf.reader import Gltf, read_gltf
-from exporters.tiles.check import read_tileset
+from exporters.tiles.check import TILESET
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
 from georef.untrusted.damage import DamagedFile, decoding
@@ -156,7 +156,9 @@ def _tileset(path: Path) -> GlobeAsset:
 
 
 def _contents(path: Path) -> Iterator[str]:
-    pending: list[dict[str, Any]] = [read_tileset(path)["root"]]
+    document = _json(path)
+    check_shape(document, TILESET)
+    pending: list[dict[str, Any]] = [document["root"]]
     while pending:
         tile = pending.pop()
         if "implicitTiling" in tile:
