@@ -13,14 +13,14 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.errors import DAMAGE, ExportError
+from exporters.errors import ExportError
 from exporters.georeference import placement_of_record
-from exporters.gltf.container import open_glb
-from exporters.gltf.reader import Gltf
+from exporters.gltf.reader import Gltf, open_glb
 from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
 from exporters.tiles.b3dm import part_table
-from georef.errors import InputError
 from georef.geodesy import tile_from_asset
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.json_shape import NUMBER, Needed, Numbers, check_shape
 
 SAME_PLACE_M = 1e-3
 """A tile's transform and the place recorded in its content may differ by this much: the project's promise."""
@@ -63,17 +63,17 @@ def read_figures(path: Path) -> Iterator[PlacedFigure]:
 def read_figure(path: Path) -> PlacedFigure:
     """The record of one .glb file, its one content. Raises ExportError where it has no place or is no glTF."""
     gltf = open_glb(path)
-    asset = gltf.document.get("asset", {})
-    extras = asset.get("extras", {}) if isinstance(asset, dict) else {}
-    record = extras.get("georeference") if isinstance(extras, dict) else None
+    record = gltf.extras.get("georeference")
     if not isinstance(record, dict):
         raise ExportError(path, "has no place on the earth", "make it with --lonlat LON LAT")
     try:
         placement = placement_of_record(record)
         low, high = _bounds(gltf)
         table = part_table(gltf)
-        shares = [float(share) for share in table.get("observedShare", [])]
-        metadata = extras.get("metadata", {})
+        shares = table.get("observedShare", [])
+        if not all(isinstance(share, float) for share in shares):
+            raise DamagedFile("observedShare holds no numbers")
+        metadata = gltf.extras.get("metadata")
         return PlacedFigure(
             name=next((str(node["name"]) for node in gltf.items("nodes") if node.get("name")), path.stem),
             placement=placement,
@@ -81,16 +81,14 @@ def read_figure(path: Path) -> PlacedFigure:
             high=vector(high),
             contents=(os.path.abspath(path),),
             errors=(0.0,),
-            source=str(metadata.get("source", "")),
-            copyright=str(asset.get("copyright", "")),
+            source=str(metadata.get("source", "")) if isinstance(metadata, dict) else "",
+            copyright=gltf.document.get("asset", {}).get("copyright", ""),
             parts=tuple(map(str, table.get("name", []))),
             shares=tuple(round(share, 4) for share in shares),
             observed=_observed(gltf, np.array(shares)) if shares else None,
         )
-    except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
-        raise ExportError(path, f"broken glTF ({' '.join(str(error).split())[:120]})", "see validate") from error
+    except DamagedFile as error:
+        raise ExportError(path, f"broken glTF ({error})", "see validate") from error
 
 
 def _bounds(gltf: Gltf) -> tuple[Box, Box]:
@@ -100,17 +98,23 @@ def _bounds(gltf: Gltf) -> tuple[Box, Box]:
     """
     corners = []
     for mesh, matrix in gltf.instances():
-        for primitive in gltf.items("meshes")[mesh]["primitives"]:
-            accessor = gltf.items("accessors")[primitive["attributes"]["POSITION"]]
+        for primitive in gltf.primitives(mesh):
+            if "POSITION" not in primitive["attributes"]:
+                raise DamagedFile(f"meshes/{mesh} has no positions")
+            accessor = gltf.item("accessors", primitive["attributes"]["POSITION"])
+            if len(accessor.get("min", ())) != 3 or len(accessor.get("max", ())) != 3:
+                raise DamagedFile(f"the positions of meshes/{mesh} have no min and max")
             ends = np.array([accessor["min"], accessor["max"]], dtype=np.float64)
             if accessor.get("normalized"):
+                if accessor["componentType"] not in INTEGER_SCALES:
+                    raise DamagedFile(f"normalised positions of componentType {accessor['componentType']}")
                 ends = np.maximum(ends / INTEGER_SCALES[accessor["componentType"]], -1.0)
             corners.append(ends[PICKS, [0, 1, 2]] @ matrix[:3, :3].T + matrix[:3, 3])
     if not corners:
-        raise ValueError("no mesh in its scene")
+        raise DamagedFile("no mesh in its scene")
     points = tile_from_asset().apply(np.concatenate(corners))
     if not np.isfinite(points).all():
-        raise ValueError("vertices that are not finite")
+        raise DamagedFile("vertices that are not finite")
     return points.min(axis=0), points.max(axis=0)
 
 
@@ -119,9 +123,13 @@ def _observed(gltf: Gltf, shares: NDArray[np.float64]) -> float | None:
     used = gltf.document.get("extensionsUsed", [])
     if len(gltf.items("meshes")) != 1 or any("compression" in each or "quantization" in each for each in used):
         return None
-    primitive = gltf.items("meshes")[0]["primitives"][0]
+    if not gltf.primitives(0) or "_FEATURE_ID_0" not in gltf.primitives(0)[0]["attributes"]:
+        raise DamagedFile("no part is given for its vertices")
     positions, faces = gltf.mesh_arrays()
-    rows = gltf.accessor(primitive["attributes"]["_FEATURE_ID_0"]).astype(np.int64)
+    ids = gltf.accessor(gltf.primitives(0)[0]["attributes"]["_FEATURE_ID_0"])
+    if ids.shape != (len(positions),) or not ((ids >= 0) & (ids < len(shares))).all():
+        raise DamagedFile("the vertices' parts are not among those of its property table")
+    rows = ids.astype(np.int64)
     first, second, third = rows[faces].T
     # A triangle belongs to the part that two of its corners carry, as in exporters.sampling.
     values = shares[np.where(second == third, second, first)]
@@ -140,11 +148,8 @@ def _tileset(path: Path, chain: frozenset[Path], read: set[Path]) -> Iterator[Pl
     read.add(path.resolve())
     try:
         yield from _tiles(document["root"], path, chain | {path.resolve()}, read)
-    except DAMAGE as error:
-        if isinstance(error, InputError):
-            raise
-        reason = " ".join(str(error).split())[:120]
-        raise ExportError(path, f"broken tileset ({type(error).__name__}: {reason})", "see validate") from error
+    except DamagedFile as error:
+        raise ExportError(path, f"broken tileset ({error})", "see validate") from error
 
 
 def _tiles(tile: dict[str, Any], path: Path, chain: frozenset[Path], read: set[Path]) -> Iterator[PlacedFigure]:
@@ -170,10 +175,12 @@ def _figure_of_tiles(tile: dict[str, Any], path: Path) -> PlacedFigure:
         if not uri.lower().endswith(".glb") or len(children) > 1:
             found = f"content {uri!r} with {len(children)} finer tiles is no level of a figure"
             raise ExportError(path, found, "give the .glb files instead")
+        check_shape(below, {"geometricError": Needed(NUMBER)}, f"tile of {uri[:40]}")
         levels.append((path.parent / uri, float(below["geometricError"])))
         below = children[0] if children else None
     records = [read_figure(file) for file, _ in reversed(levels)]
     finest = records[0]
+    check_shape(tile["transform"], Numbers(16), "transform")
     matrix = np.asarray(tile["transform"], dtype=np.float64).reshape(4, 4).T
     away = float(np.linalg.norm(ecef_matrix(finest.placement)[:3, 3] - matrix[:3, 3]))
     if away > SAME_PLACE_M:

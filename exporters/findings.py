@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from exporters.georeference import placement_of_record, placement_of_tile
 from exporters.solid import measure_topology
-from georef.errors import one_line
+from georef.errors import PlacementError, one_line
 from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.transform import column_major
+from georef.untrusted.damage import DamagedFile
 
 Severity = Literal["error", "warning", "info"]
 
@@ -83,7 +84,7 @@ def check_place(record: Any, where: str) -> list[Finding]:
     try:
         place = placement_of_record(record)
         back = placement_of_tile(column_major(ecef_from_tile(place)))
-    except ValueError as error:
+    except (PlacementError, DamagedFile) as error:
         return [Finding("error", "GEOREFERENCE", str(error), where)]
     said = (place.lon_deg, place.lat_deg, place.height_m)
     return check_same_place(

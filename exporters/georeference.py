@@ -6,13 +6,26 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from georef.errors import PlacementError
 from georef.frames import ECEF, TILE
 from georef.geodesy import geodetic_from_ecef, nose_bearing_deg
 from georef.placement import GeoPlacement
 from georef.transform import Transform
+from georef.untrusted.damage import DamagedFile, decoding
+from georef.untrusted.json_shape import NUMBER, Needed, Numbers, check_shape
+
+RECORD = {
+    "crs": Needed(str),
+    "lon_deg": Needed(NUMBER),
+    "lat_deg": Needed(NUMBER),
+    "height_m": NUMBER,
+    "height_datum": str,
+    "heading_deg": NUMBER,
+    "figure_height_m": NUMBER,
+    "altitude_mode": str,
+}
+"""The record of a place."""
 
 
 def georeference(placement: GeoPlacement) -> dict[str, Any]:
@@ -32,25 +45,29 @@ def georeference(placement: GeoPlacement) -> dict[str, Any]:
 def placement_of_record(record: Mapping[str, Any]) -> GeoPlacement:
     """The placement that `georeference` made a record of, as read back from a file.
 
-    Raises ValueError for a record of another kind or with values that no placement has.
+    Raises DamagedFile for a record of another kind or with values that no placement has.
     """
-    if record.get("crs") != "EPSG:4979":
-        raise ValueError(f"georeference: crs is {record.get('crs')!r}, expected EPSG:4979")
-    fields = {name: value for name, value in record.items() if name != "crs"}
+    check_shape(record, RECORD, "georeference: ")
+    if record["crs"] != "EPSG:4979":
+        raise DamagedFile(f"georeference: crs is {record['crs']!r}, expected EPSG:4979")
+    if unknown := record.keys() - RECORD.keys():
+        raise DamagedFile(f"georeference: {sorted(unknown)[0][:40]} is not of a place")
     try:
-        return GeoPlacement(**fields)
-    except (TypeError, PlacementError) as error:
-        raise ValueError(f"georeference: {error}") from error
+        return GeoPlacement(**{name: value for name, value in record.items() if name != "crs"})
+    except PlacementError as error:
+        raise DamagedFile(f"georeference: {error}") from error
 
 
-def placement_of_tile(transform: ArrayLike) -> dict[str, float]:
+def placement_of_tile(transform: list[float]) -> dict[str, float]:
     """Longitude, latitude, ellipsoidal height and nose bearing that a tile transform gives a figure.
 
     transform : 16 numbers, column by column, ECEF from TILE, as in a tileset
-    Raises ValueError for a matrix that is no such transform.
+    Raises DamagedFile for what is no such transform.
     """
+    check_shape(transform, Numbers(16), "transform")
     matrix = np.asarray(transform, dtype=np.float64).reshape(4, 4).T
-    ecef_from_tile = Transform(ECEF, TILE, matrix)
-    lon, lat, height = geodetic_from_ecef(matrix[:3, 3]).tolist()
-    bearing = nose_bearing_deg(ecef_from_tile)
+    with decoding("transform", PlacementError, ValueError):  # of matrices that are not affine, or not upright
+        ecef_from_tile = Transform(ECEF, TILE, matrix)
+        lon, lat, height = geodetic_from_ecef(matrix[:3, 3]).tolist()
+        bearing = nose_bearing_deg(ecef_from_tile)
     return {"lon_deg": lon, "lat_deg": lat, "height_m": height, "heading_deg": bearing}

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from exporters.errors import DAMAGE, ExportError
-from exporters.findings import Finding, check_solid
+from exporters.errors import ExportError
+from exporters.findings import Finding
 from exporters.gis.check import check_czml, check_geojson
 from exporters.gltf.check import check_gltf
-from exporters.solid import merged_by_position
 from exporters.tiles.check import check_tileset
-from exporters.triangle_files import check_triangle_file, references_of
+from exporters.triangles.check import check_triangles
 from exporters.usd.process import check_usd_apart
-from georef.untrusted.json_file import is_there
+from georef.errors import PlacementError
+from georef.untrusted.damage import DamagedFile
 
-__all__ = ["Finding", "read_triangles", "validate"]
+__all__ = ["Finding", "validate"]
+
+CHECKS = {
+    ".usda": check_usd_apart,
+    ".usdc": check_usd_apart,
+    ".usdz": check_usd_apart,
+    ".ply": check_triangles,
+    ".obj": check_triangles,
+    ".czml": check_czml,
+    ".geojson": check_geojson,
+}
+CHECKS_WITH_KHRONOS = {".glb": check_gltf, ".gltf": check_gltf, ".json": check_tileset}
 
 
 def validate(path: str | os.PathLike[str], external: bool = True) -> list[Finding]:
@@ -34,64 +42,15 @@ def validate(path: str | os.PathLike[str], external: bool = True) -> list[Findin
         raise ExportError(path, "is not there", "check the name")
     try:
         findings = _check_any(path, external)
-    except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
-        # Files from elsewhere are damaged in more ways than can be listed; all of them end here.
-        reason = " ".join(str(error).split())[:120]
-        findings = [Finding("error", "DAMAGED", f"{type(error).__name__}: {reason}", path.name)]
+    except (DamagedFile, PlacementError) as error:
+        findings = [Finding("error", "DAMAGED", str(error), path.name)]
     return sorted(findings, key=lambda finding: ("error", "warning", "info").index(finding.severity))
 
 
 def _check_any(path: Path, external: bool) -> list[Finding]:
-    suffix = path.suffix.lower()
-    if path.is_dir() or suffix == ".json":
-        return check_tileset(path, external)
-    if suffix in (".glb", ".gltf"):
-        return check_gltf(path, external)
-    if suffix in (".usda", ".usdc", ".usdz"):
-        return check_usd_apart(path)
-    if suffix in (".ply", ".obj"):
-        return _check_triangles(path)
-    if suffix == ".czml":
-        return check_czml(path)
-    if suffix == ".geojson":
-        return check_geojson(path)
+    suffix = ".json" if path.is_dir() else path.suffix.lower()
+    if suffix in CHECKS_WITH_KHRONOS:
+        return CHECKS_WITH_KHRONOS[suffix](path, external)
+    if suffix in CHECKS:
+        return CHECKS[suffix](path)
     raise ExportError(path, f"no check for suffix {suffix or 'none'}", "see exporters.write.FORMATS")
-
-
-def read_triangles(path: Path) -> Any:
-    """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
-    import trimesh
-
-    check_triangle_file(path)
-    try:
-        mesh = trimesh.load_mesh(str(path), process=False)
-    except Exception as error:  # trimesh lets whatever its parsers meet through
-        raise ExportError(path, f"cannot be read ({error})", "write it again") from error
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise ExportError(path, "holds no single triangle mesh", "write it again")
-    return mesh
-
-
-def _check_triangles(path: Path) -> list[Finding]:
-    try:
-        mesh = read_triangles(path)
-    except ExportError as error:
-        return [Finding("error", "UNREADABLE", error.finding, path.name)]
-    vertices = np.asarray(mesh.vertices)
-    if not np.isfinite(vertices).all():
-        return [Finding("error", "NOT_FINITE", "vertices are NaN or infinite", path.name)]
-    findings = []
-    if path.suffix.lower() == ".obj":
-        findings = _check_references(path)
-    return findings + check_solid(*merged_by_position(vertices, np.asarray(mesh.faces)), path.name)
-
-
-def _check_references(path: Path) -> list[Finding]:
-    """Files that an OBJ and its material libraries name but that are not there."""
-    return [
-        Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
-        for file, word, name, target in references_of(path)
-        if not is_there(target)
-    ]

@@ -10,6 +10,8 @@ __all__ = ["FigureError", "InputError", "OutputError"]
 class FigureError(InputError):
     """The picture, mask, joints or part labels of a figure cannot be used."""
 
+    lasting = True
+
 
 class OutputError(InputError):
     """A result cannot be written where it was asked for."""

@@ -6,6 +6,8 @@ code 2 in the command line; anything else is a fault of ours.
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 MOST_CHARACTERS = 600
 """Of each part of a message: a path may be long, a text out of a file has no business to be."""
 
@@ -21,7 +23,7 @@ def one_line(text: str) -> str:
     return text if len(text) <= MOST_CHARACTERS else f"{text[:half]}…{text[-half:]}"
 
 
-class InputError(ValueError):
+class InputError(Exception):
     """Input that cannot be used: names the input, the finding and the remedy.
 
     Parameters
@@ -30,8 +32,12 @@ class InputError(ValueError):
     finding : what was found in it
     remedy : what to do about it
 
+    `lasting`: the same input fails again until it is changed, so that a batch need not try again.
+
     Texts out of files become part of it, so it is made one line of printable characters, see `one_line`.
     """
+
+    lasting: ClassVar[bool] = False
 
     def __init__(self, source: object, finding: str, remedy: str) -> None:
         self.source = one_line(str(source))

@@ -18,12 +18,14 @@ from exporters.errors import ExportError
 from exporters.findings import Finding
 from exporters.georeference import placement_of_record
 from exporters.gis.czml import entity_quaternion, height_reference
-from exporters.gltf.container import open_glb
+from exporters.gltf.reader import open_glb
 from exporters.tiles.check import PLACE_TOLERANCE_M, TURN_TOLERANCE_DEG
 from exporters.tiles.volumes import numbers
 from georef.geodesy import ecef_from_geodetic
 from georef.placement import GeoPlacement
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import is_there, read_json
+from georef.untrusted.json_shape import check_shape
 
 # fmt: off
 GEOMETRIES = {
@@ -54,7 +56,7 @@ def check_geojson(path: Path) -> list[Finding]:
 
 
 def _geojson(item: Any, path: Path, where: str) -> Iterator[Finding]:
-    kind = item.get("type") if isinstance(item, dict) else None
+    kind = str(item.get("type")) if isinstance(item, dict) else None
     if kind == "FeatureCollection":
         if not isinstance(item.get("features"), list):
             yield Finding("error", "FEATURES", "a FeatureCollection needs features", where)
@@ -71,7 +73,10 @@ def _geojson(item: Any, path: Path, where: str) -> Iterator[Finding]:
         found = [] if item["geometry"] is None else list(_geojson(item["geometry"], path, where))
         yield from found or _model_of_feature(item, path, where)
     elif kind == "GeometryCollection":
-        for each in item.get("geometries", []):
+        if not isinstance(item.get("geometries"), list):
+            yield Finding("error", "GEOMETRIES", "a GeometryCollection needs geometries", where)
+            return
+        for each in item["geometries"]:
             yield from _geojson(each, path, where)
     elif kind in GEOMETRIES:
         yield from _positions(item.get("coordinates"), GEOMETRIES[kind], where)
@@ -127,10 +132,9 @@ def _placement(uri: str, path: Path, where: str) -> tuple[GeoPlacement | None, l
     if file.suffix.lower() != ".glb":
         return None, []
     try:
-        asset = open_glb(file).document.get("asset", {})
-        record = asset.get("extras", {}).get("georeference")
+        record = open_glb(file).extras.get("georeference")
         return (placement_of_record(record) if record is not None else None), []
-    except (ExportError, AttributeError, ValueError) as error:
+    except (ExportError, DamagedFile) as error:
         return None, [Finding("error", "REFERENCE", f"model {uri!r}: {error}", where)]
 
 
@@ -160,7 +164,7 @@ def _packets(packets: Any, path: Path) -> Iterator[Finding]:
     seen: set[str] = set()
     for index, packet in enumerate(packets[1:], 1):
         where = f"{name}: {packet.get('id', index)}"
-        if packet.get("id") in seen:
+        if str(packet.get("id")) in seen:
             # Legal: later packets add to earlier ones. Among figures it merges two into one.
             yield Finding("warning", "SAME_ID", "an earlier packet has the same id", where)
         seen.add(str(packet.get("id")))
@@ -168,6 +172,7 @@ def _packets(packets: Any, path: Path) -> Iterator[Finding]:
 
 
 def _packet(packet: dict[str, Any], path: Path, where: str) -> Iterator[Finding]:
+    check_shape(packet, {"position": dict, "orientation": dict}, where)
     position = packet.get("position", {}).get("cartographicDegrees")
     if position is not None and not (isinstance(position, list) and numbers(position, len(position))):
         yield Finding("error", "COORDINATES", "cartographicDegrees are no numbers", where)
@@ -179,8 +184,10 @@ def _packet(packet: dict[str, Any], path: Path, where: str) -> Iterator[Finding]
     turned = packet.get("orientation", {}).get("unitQuaternion")
     if turned is not None and not isinstance(turned, list):
         yield Finding("error", "ORIENTATION", "unitQuaternion is no list", where)
+        return
     elif turned is not None and len(turned) == 4 and not (numbers(turned, 4) and _is_unit(turned)):
         yield Finding("error", "ORIENTATION", "unitQuaternion is not of length 1", where)
+        return
     model = packet.get("model")
     if not isinstance(model, dict):
         return

@@ -13,13 +13,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from exporters.errors import DAMAGE, ExportError
+from exporters.errors import ExportError
 from exporters.findings import Finding, as_infos, check_place, check_solid
 from exporters.gltf.khronos import khronos_findings
 from exporters.gltf.ktx2 import size_of
-from exporters.gltf.reader import MESHOPT, Gltf, NotReadHere, read_gltf
-from exporters.texture_files import MAX_TEXTURE_PX, TooLarge, check_texture
+from exporters.gltf.reader import Gltf, NotReadHere, read_gltf
+from exporters.gltf.shape import MESHOPT
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.image_file import MAX_TEXTURE_PX, TooLarge, check_texture
 
 UNIT_TOLERANCE = 5e-4
 """How far a normal's length may be from 1; the Khronos validator allows about as much."""
@@ -63,7 +66,7 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
             findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
         except NotReadHere as reason:
             findings.append(Finding("info", NOT_HERE, str(reason), where))
-        except DAMAGE as error:
+        except DamagedFile as error:
             findings.append(Finding("error", "UNREADABLE_MESH", str(error), where))
     if not external:
         return findings
@@ -85,7 +88,7 @@ def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
         yield Finding("info" if extension in CODECS else "warning", "EXTENSION_REQUIRED", message, name)
         if extension not in used:
             yield Finding("error", "EXTENSION_USED", f"{extension} is required but not among those used", name)
-    place = about.get("extras", {}).get("georeference") if isinstance(about.get("extras"), dict) else None
+    place = gltf.extras.get("georeference")
     if ours and place is not None:
         yield from check_place(place, f"{name}: asset.extras.georeference")
     for index in range(len(gltf.items("accessors"))):
@@ -107,7 +110,7 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
     except NotReadHere as reason:
         yield Finding("info", NOT_HERE, str(reason), where)
         return
-    except DAMAGE as error:
+    except DamagedFile as error:
         yield Finding("error", "ACCESSOR", str(error), where)
         return
     if values.dtype.kind == "f" and not np.isfinite(values).all():
@@ -116,8 +119,15 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
     if "bufferView" not in accessor and "sparse" not in accessor:
         return  # zeros, or in the hands of an extension
     for key, measured in (("min", values.min(axis=0)), ("max", values.max(axis=0))):
-        if key in accessor and not np.array_equal(np.asarray(accessor[key], values.dtype), np.atleast_1d(measured)):
+        if key in accessor and not np.array_equal(_stored(accessor[key], values.dtype), np.atleast_1d(measured)):
             yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, values say {measured.tolist()}", where)
+
+
+def _stored(numbers: list[float], dtype: np.dtype[Any]) -> NDArray[np.float64]:
+    """Numbers of the document as the buffers hold them: rounded where those have floats."""
+    wide = np.array(numbers, np.float64)
+    with np.errstate(over="ignore"):
+        return wide.astype(dtype).astype(np.float64) if dtype.kind == "f" else wide
 
 
 def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None, int]:
@@ -130,7 +140,7 @@ def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None,
         return check_texture(data)
     except (NotReadHere, TooLarge) as reason:
         yield Finding("info", NOT_HERE, str(reason), where)
-    except DAMAGE as error:
+    except DamagedFile as error:
         yield Finding("error", "IMAGE", str(error), where)
     return 0
 
@@ -143,7 +153,7 @@ def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bo
         yield Finding("error" if ours else "info", "NO_POSITION", "no positions: nothing is drawn", where)
         return
     count = len(gltf.accessor(attributes["POSITION"]))
-    if "min" not in gltf.items("accessors")[attributes["POSITION"]]:
+    if "min" not in gltf.item("accessors", attributes["POSITION"]):
         yield Finding("error", "MIN_MAX", "POSITION without min and max", where)
     for attribute, accessor in attributes.items():
         length = len(gltf.accessor(accessor))
@@ -157,9 +167,9 @@ def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bo
         yield Finding("error" if ours else "info", "NOT_TRIANGLES", f"mode {mode}: no list of triangles", where)
     if indices.max() >= count:
         # Everything after this would read beyond the vertices.
-        raise ValueError(f"index {int(indices.max())} of {count} vertices")
+        raise DamagedFile(f"index {int(indices.max())} of {count} vertices")
     if "NORMAL" in attributes:
-        length = np.linalg.norm(gltf.numbers(attributes["NORMAL"]).astype(np.float64), axis=1)
+        length = np.linalg.norm(gltf.vectors(attributes["NORMAL"], 3).astype(np.float64), axis=1)
         worst = float(np.abs(length - 1).max())
         if worst > (BYTE_UNIT_TOLERANCE if gltf.accessor(attributes["NORMAL"]).itemsize == 1 else UNIT_TOLERANCE):
             yield Finding("error", "NORMAL_LENGTH", f"normals are up to {worst:.2g} off unit length", where)
@@ -175,12 +185,14 @@ def _check_features(gltf: Gltf, primitive: dict[str, Any], where: str) -> Iterat
     for feature in extension.get("featureIds", []):
         if "attribute" not in feature:
             continue
-        ids = gltf.accessor(primitive["attributes"][f"_FEATURE_ID_{feature['attribute']}"])
+        name = f"_FEATURE_ID_{feature['attribute']}"
+        if name not in primitive["attributes"]:
+            raise DamagedFile(f"feature ids are in {name}, which is not there")
+        ids = gltf.accessor(primitive["attributes"][name])
         if ids.min() < 0 or ids.max() >= feature["featureCount"] or (ids != np.rint(ids)).any():
             yield Finding("error", "FEATURE_ID", f"feature ids outside 0..{feature['featureCount'] - 1}", where)
         table = feature.get("propertyTable")
-        metadata = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {})
-        if table is not None and table >= len(metadata.get("propertyTables", [])):
+        if table is not None and table >= len(gltf.tables):
             yield Finding("error", "PROPERTY_TABLE", f"there is no property table {table}", where)
 
 
@@ -197,8 +209,8 @@ def _check_property_tables(gltf: Gltf) -> Iterator[Finding]:
                 values = gltf.view(column["values"])
                 if "stringOffsets" not in column:
                     continue
-                offsets = np.frombuffer(gltf.view(column["stringOffsets"]), "<u4")
-            except (ValueError, LookupError) as error:
+                offsets = gltf.column(column["stringOffsets"], "<u4")
+            except DamagedFile as error:
                 yield Finding("error", "PROPERTY", f"{key}: {error}", where)
                 continue
             expected = table["count"] + 1
@@ -208,7 +220,7 @@ def _check_property_tables(gltf: Gltf) -> Iterator[Finding]:
 
 
 def _check_property_textures(gltf: Gltf) -> Iterator[Finding]:
-    metadata = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {})
+    metadata = gltf.extension("EXT_structural_metadata")
     classes = metadata.get("schema", {}).get("classes", {})
     for index, holder in enumerate(metadata.get("propertyTextures", [])):
         where = f"{gltf.path.name}: propertyTextures/{index}"
@@ -230,20 +242,21 @@ def _check_manifold(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
         return
     where = f"{where}/EXT_mesh_manifold"
     solid = extension["manifoldPrimitive"]
-    accessor = gltf.items("accessors")[solid["indices"]]
+    accessor = gltf.item("accessors", solid["indices"])
     if set(solid["attributes"]) != {"POSITION"} or "material" in solid:
         yield Finding("error", "MANIFOLD", "manifoldPrimitive may have positions and indices only", where)
     for primitive in mesh["primitives"]:
-        same = gltf.items("accessors")[primitive["indices"]]["bufferView"] == accessor["bufferView"]
-        if not same or primitive["attributes"]["POSITION"] != solid["attributes"]["POSITION"]:
+        indices = gltf.item("accessors", primitive["indices"]) if "indices" in primitive else {}
+        same = indices.get("bufferView") == accessor.get("bufferView")
+        if not same or primitive["attributes"].get("POSITION") != solid["attributes"].get("POSITION"):
             yield Finding("error", "MANIFOLD", "manifoldPrimitive does not share indices and positions", where)
     if len(mesh["primitives"]) != 1:
         return
     positions, faces = gltf.mesh_arrays(index)
-    merged = gltf.accessor(solid["indices"]).astype(np.int64).reshape(-1, 3)
-    if merged.shape != faces.shape or merged.max() >= len(positions):
+    merged = gltf.accessor(solid["indices"])
+    if merged.size != faces.size or merged.dtype.kind != "u" or merged.max() >= len(positions):
         yield Finding("error", "MANIFOLD", "manifoldPrimitive has other triangles than the mesh", where)
-    elif not np.array_equal(positions[faces], positions[merged]):
+    elif not np.array_equal(positions[faces], positions[merged.reshape(-1, 3)]):
         yield Finding("error", "MANIFOLD", "vertices at different positions are merged", where)
     if "sparse" in accessor and not {"mergeIndices", "mergeValues"} <= set(extension):
         yield Finding("error", "MANIFOLD", "sparse indices without mergeIndices and mergeValues", where)

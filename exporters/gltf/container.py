@@ -1,4 +1,4 @@
-"""Binary glTF from bytes, or from a file of which only the pages asked for are read.
+"""The container of binary glTF: a header and two chunks, the document and its buffer.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#glb-file-format-specification
 """
@@ -8,48 +8,60 @@ from __future__ import annotations
 import mmap
 import struct
 from pathlib import Path
-from typing import Any, cast
 
-from exporters.errors import DAMAGE, ExportError
-from exporters.gltf.reader import Gltf
-from georef.untrusted.json_file import parse_json
+from georef.untrusted.damage import DamagedFile
+
+MAGIC = b"glTF"
+HEADER, CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
+
+Bytes = bytes | memoryview
 
 
-def open_glb(path: Path) -> Gltf:
-    """A .glb file mapped into memory: its JSON is parsed, its buffer read where `view` and `accessor` look.
+def mapped(path: Path) -> memoryview:
+    """The bytes of a file, of which only the pages that are looked at are read; valid as long as it is referred to.
 
-    `view` gives memoryviews, valid as long as the record. Raises ExportError for what is no binary glTF.
+    Raises DamagedFile for what is no plain file, or empty; OSError where it cannot be read.
     """
     try:
         if not path.is_file():  # a pipe would be waited for
-            raise ValueError("is not there" if not path.exists() else "no plain file")
+            raise DamagedFile("is not there" if not path.exists() else "no plain file")
         with path.open("rb") as stream:
-            data = memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ExportError(path, f"no readable glTF ({reason})", "check the name") from error
-    return glb_of(data, path)
+            return memoryview(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ))
+    except ValueError as error:  # no memory can be mapped to an empty file
+        raise DamagedFile(str(error)) from error
 
 
-def glb_of(data: bytes | memoryview, path: Path) -> Gltf:
-    """The record of a .glb file's bytes; path : for messages. Raises ExportError for what is no binary glTF."""
-    try:
-        magic, version, length = struct.unpack_from("<4sII", data)
-        if magic != b"glTF" or version != 2 or length > len(data):
-            raise ValueError(f"starts with {bytes(magic)!r} version {version}, {length} of {len(data)} bytes")
-        size, kind = struct.unpack_from("<I4s", data, 12)
-        document: dict[str, Any] = parse_json(data[20 : 20 + size])
-        if kind != b"JSON" or not isinstance(document, dict):
-            raise ValueError("the first chunk is no JSON object")
-        place = 20 + size
-        buffers: tuple[bytes, ...] = ()
-        if place + 8 <= length:
-            size, kind = struct.unpack_from("<I4s", data, place)
-            if kind != b"BIN\0" or place + 8 + size > length:
-                raise ValueError(f"the second chunk is {bytes(kind)!r} of {size} bytes")
-            buffers = (cast(bytes, data[place + 8 : place + 8 + size]),)
-        if any("uri" in item for item in document.get("buffers", [])):
-            raise ValueError("keeps its buffers in other files")
-    except DAMAGE as error:
-        raise ExportError(path, f"no readable glTF ({error})", "give a .glb") from error
-    return Gltf(document, buffers, path)
+def split_glb(data: Bytes) -> tuple[Bytes, Bytes | None]:
+    """The JSON text and the binary chunk, None where there is none.
+
+    Raises DamagedFile for a header or chunks that break the rules.
+    """
+    if len(data) < HEADER.size:
+        raise DamagedFile(f"{len(data)} bytes, less than the header")
+    magic, version, length = HEADER.unpack_from(data)
+    if magic != MAGIC or version != 2:
+        raise DamagedFile(f"starts with {magic!r} version {version}, expected b'glTF' version 2")
+    if length != len(data):
+        raise DamagedFile(f"header says {length} bytes, file has {len(data)}")
+    chunks: list[Bytes] = []
+    place = HEADER.size
+    for kind in (b"JSON", b"BIN\0"):
+        if place == length:
+            break
+        if place + CHUNK.size > length:
+            raise DamagedFile(f"chunk at byte {place} is cut off")
+        size, found = CHUNK.unpack_from(data, place)
+        if found != kind or size % 4 or place + CHUNK.size + size > length:
+            raise DamagedFile(f"chunk at byte {place} is {found!r} of {size} bytes, expected {kind!r} within the file")
+        chunks.append(data[place + CHUNK.size : place + CHUNK.size + size])
+        place += CHUNK.size + size
+    if not chunks:
+        raise DamagedFile("no chunk of JSON")
+    return chunks[0], chunks[1] if len(chunks) > 1 else None
+
+
+def join_glb(text: bytes, binary: bytes) -> bytes:
+    """A binary glTF of a document and its buffer, both padded to multiples of four bytes."""
+    length = HEADER.size + CHUNK.size + len(text) + CHUNK.size + len(binary)
+    head = HEADER.pack(MAGIC, 2, length)
+    return b"".join([head, CHUNK.pack(len(text), b"JSON"), text, CHUNK.pack(len(binary), b"BIN\0"), binary])

@@ -2,18 +2,19 @@
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 
-Written with `json` and `struct`: the format is small, and the bytes stay ours (an object model such as pygltflib's
+Written with `json`: the format is small, and the bytes stay ours (an object model such as pygltflib's
 costs 0.2 s to import and decides the order of keys).
 """
 
 from __future__ import annotations
 
 import json
-import struct
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from exporters.gltf.container import join_glb
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 COMPONENT_TYPES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
@@ -102,16 +103,7 @@ class Document:
         binary += bytes(-len(binary) % 4)
         text = self.text({"byteLength": len(binary)})
         text += b" " * (-len(text) % 4)
-        length = 12 + 8 + len(text) + 8 + len(binary)
-        return b"".join(
-            [
-                struct.pack("<4sII", b"glTF", 2, length),
-                struct.pack("<I4s", len(text), b"JSON"),
-                text,
-                struct.pack("<I4s", len(binary), b"BIN\0"),
-                binary,
-            ]
-        )
+        return join_glb(text, binary)
 
     def text(self, buffer: dict[str, Any]) -> bytes:
         """The document as JSON; buffer : how it names its bytes."""

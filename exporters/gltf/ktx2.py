@@ -16,6 +16,7 @@ import numpy as np
 from exporters.asset import Texture, TexturedMesh
 from exporters.errors import ExportError
 from exporters.node_packages import find_package
+from georef.untrusted.damage import DamagedFile
 
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 
@@ -85,8 +86,8 @@ def padded(mesh: TexturedMesh) -> TexturedMesh:
 
 
 def size_of(data: bytes) -> tuple[int, int]:
-    """Width and height of a KTX 2 file in pixels. Raises ValueError for other data."""
+    """Width and height of a KTX 2 file in pixels. Raises DamagedFile for other data."""
     if not data.startswith(IDENTIFIER) or len(data) < 48:
-        raise ValueError("no KTX 2 file")
+        raise DamagedFile("no KTX 2 file")
     width, height = struct.unpack_from("<2I", data, 20)
     return int(width), int(height)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from exporters.asset import FloatArray, TexturedMesh
 from exporters.errors import ExportError
+from georef.untrusted.damage import decoding
 
 FULL = 65535
 """Steps of a position along the longest side of the mesh, and of a texture coordinate."""
@@ -38,10 +39,12 @@ def encode(rows: NDArray[Any], mode: Literal["ATTRIBUTES", "TRIANGLES", "INDICES
 def decode(data: bytes, extension: dict[str, Any]) -> bytes:
     """The bytes of a compressed bufferView; extension : its EXT_meshopt_compression.
 
-    Raises ExportError without the codec, ValueError for data that is none of its.
+    Raises ExportError without the codec, DamagedFile for data that is none of its.
     """
     size = int(extension["byteStride"])
-    found = codec().decode_gltf_buffer(data, int(extension["count"]), size, extension["mode"], extension.get("filter"))
+    meshopt, count = codec(), int(extension["count"])
+    with decoding("no data of meshopt", Exception):  # its wrapper checks some of it by assertions
+        found = meshopt.decode_gltf_buffer(data, count, size, extension["mode"], extension.get("filter"))
     return bytes(np.ascontiguousarray(found).tobytes())
 
 

@@ -1,25 +1,31 @@
-"""glTF files back into arrays, for checking and inspecting what was written.
+"""glTF files back into arrays: documents, buffers, accessors, images, and nodes with their transforms.
+
+What a document says is checked before it is believed: of types by `exporters.gltf.shape`, of numbers where they are
+used. Whatever is wrong is a `DamagedFile`; another kind of exception from here is a mistake of ours.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
 
 from __future__ import annotations
 
-import struct
+import itertools
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.errors import DAMAGE, ExportError
+from exporters.errors import ExportError
 from exporters.gltf import meshopt
+from exporters.gltf.container import Bytes, mapped, split_glb
+from exporters.gltf.shape import DOCUMENT, MESHOPT
 from exporters.solid import merged_by_position
+from georef.untrusted.damage import DamagedFile, decoding
 from georef.untrusted.json_file import parse_json, read_bytes
+from georef.untrusted.json_shape import check_shape
 
-MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 MAX_BYTES = 1 << 30
 """Largest file, or file beside it, that is read: 3D Tiles' clients give up at a tenth."""
@@ -34,7 +40,7 @@ MAX_SCENE_VERTICES = 20_000_000
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
-class NotReadHere(ValueError):
+class NotReadHere(DamagedFile):
     """Sound data in a form that is not decoded here, or whose decoder is not installed."""
 
 
@@ -49,19 +55,58 @@ class Gltf:
 
     def items(self, kind: str) -> list[dict[str, Any]]:
         """A top-level array of the document, empty if absent."""
-        found = self.document.get(kind, [])
-        return found if isinstance(found, list) else []
+        found: list[dict[str, Any]] = self.document.get(kind, [])
+        return found
+
+    def item(self, kind: str, index: int) -> dict[str, Any]:
+        """An item of a top-level array. Raises DamagedFile for an index beyond its end."""
+        found = self.items(kind)
+        if index >= len(found):
+            raise DamagedFile(f"there are no {kind}/{index}")
+        return found[index]
+
+    @property
+    def extras(self) -> dict[str, Any]:
+        """The extras of the asset; empty where they are no object."""
+        found = self.document.get("asset", {}).get("extras")
+        return found if isinstance(found, dict) else {}
+
+    @property
+    def tables(self) -> list[dict[str, Any]]:
+        """The property tables of EXT_structural_metadata."""
+        found: list[dict[str, Any]] = self.extension("EXT_structural_metadata").get("propertyTables", [])
+        return found
+
+    def extension(self, name: str) -> dict[str, Any]:
+        """An extension of the document, empty where it has none of that name."""
+        found: dict[str, Any] = self.document.get("extensions", {}).get(name, {})
+        return found
+
+    def column(self, view: int, dtype: str) -> NDArray[Any]:
+        """The numbers (N,) that a buffer view is full of. Raises DamagedFile where it holds no whole number of them."""
+        data = self.view(view)
+        if len(data) % np.dtype(dtype).itemsize:
+            raise DamagedFile(f"bufferView {view} of {len(data)} bytes is no column of {np.dtype(dtype).name}")
+        return np.frombuffer(data, dtype)
+
+    def texts(self, column: dict[str, Any]) -> list[str]:
+        """The texts in a column of a property table. Raises DamagedFile where they are none."""
+        if "stringOffsets" not in column:
+            raise DamagedFile("a column of texts has no stringOffsets")
+        data, offsets = bytes(self.view(column["values"])), self.column(column["stringOffsets"], "<u4").tolist()
+        with decoding("no UTF-8 in a property table", UnicodeDecodeError):
+            return [data[begin:end].decode() for begin, end in itertools.pairwise(offsets)]
 
     def view(self, index: int) -> bytes:
         """The bytes of a buffer view, decompressed if they are compressed.
 
-        Raises ValueError where it lies outside its buffer, NotReadHere without the decoder.
+        Raises DamagedFile where it lies outside its buffer, NotReadHere without the decoder.
         """
-        view = self.items("bufferViews")[index]
+        view = self.item("bufferViews", index)
         for name in MESHOPT:
             if name in view.get("extensions", {}):
                 packed = view["extensions"][name]
-                self._charge(int(packed["count"]) * int(packed["byteStride"]))
+                self._charge(packed["count"] * packed["byteStride"])
                 try:
                     return meshopt.decode(self._span(packed, index), packed)
                 except ExportError as error:
@@ -69,16 +114,16 @@ class Gltf:
         return self._span(view, index)
 
     def _span(self, view: dict[str, Any], index: int) -> bytes:
+        if view["buffer"] >= len(self.buffers):
+            raise DamagedFile(f"there is no buffer {view['buffer']}")
         data: bytes = self.buffers[view["buffer"]]
-        begin, length = int(view.get("byteOffset", 0)), int(view["byteLength"])
-        if begin < 0 or begin + length > len(data):
-            raise ValueError(f"bufferView {index} ends at byte {begin + length} of {len(data)}")
+        begin, length = view.get("byteOffset", 0), view["byteLength"]
+        if begin + length > len(data):
+            raise DamagedFile(f"bufferView {index} ends at byte {begin + length} of {len(data)}")
         return data[begin : begin + length]
 
     def _charge(self, numbers: int) -> None:
         """Count what is asked of the file. Raises NotReadHere beyond `FREE_NUMBERS` and `NUMBERS_A_BYTE`."""
-        if numbers < 0:
-            raise ValueError(f"a negative number of elements, {numbers}")
         self._given[0] += numbers
         if self._given[0] > FREE_NUMBERS + NUMBERS_A_BYTE * sum(map(len, self.buffers)):
             raise NotReadHere("its accessors hold far more than the file does")
@@ -86,14 +131,15 @@ class Gltf:
     def accessor(self, index: int) -> NDArray[Any]:
         """An accessor's values, (N,) or (N, width), sparse replacements applied.
 
-        Raises ValueError out of bounds, NotReadHere for more than a file of this size has to say.
+        Raises DamagedFile out of bounds, NotReadHere for more than a file of this size has to say.
         """
-        accessor = self.items("accessors")[index]
-        dtype = np.dtype(DTYPES[accessor["componentType"]])
-        width, count = WIDTHS[accessor["type"]], accessor["count"]
-        self._charge(int(count) * width)
+        accessor = self.item("accessors", index)
+        if accessor["type"] not in WIDTHS:
+            raise DamagedFile(f"accessor {index} is of type {accessor['type'][:20]}")
+        dtype, width, count = _dtype(accessor["componentType"]), WIDTHS[accessor["type"]], accessor["count"]
+        self._charge(count * width)
         if "bufferView" in accessor:
-            view = self.items("bufferViews")[accessor["bufferView"]]
+            view = self.item("bufferViews", accessor["bufferView"])
             values = self._strided(
                 accessor["bufferView"], accessor.get("byteOffset", 0), dtype, count, width, view.get("byteStride")
             )
@@ -101,12 +147,14 @@ class Gltf:
             values = np.zeros((count, width), dtype)
         if "sparse" in accessor:
             sparse = accessor["sparse"]
-            self._charge(int(sparse["count"]) * width)
+            self._charge(sparse["count"] * width)
             places, replacements = sparse["indices"], sparse["values"]
-            index_type = np.dtype(DTYPES[places["componentType"]])
+            index_type = _dtype(places["componentType"])
             rows = self._strided(
                 places["bufferView"], places.get("byteOffset", 0), index_type, sparse["count"], 1, None
             )
+            if index_type.kind != "u" or rows.max() >= count:
+                raise DamagedFile(f"accessor {index}: sparse indices outside of its {count} elements")
             values = values.copy()
             values[rows[:, 0]] = self._strided(
                 replacements["bufferView"], replacements.get("byteOffset", 0), dtype, sparse["count"], width, None
@@ -116,7 +164,7 @@ class Gltf:
     def numbers(self, index: int) -> NDArray[Any]:
         """An accessor's values as floats where it says that its integers are normalised, else as they are."""
         values = self.accessor(index)
-        if not self.items("accessors")[index].get("normalized") or values.dtype.kind == "f":
+        if not self.item("accessors", index).get("normalized") or values.dtype.kind == "f":
             return values
         scaled = values.astype(np.float64) / np.iinfo(values.dtype).max
         return np.maximum(scaled, -1.0) if values.dtype.kind == "i" else scaled
@@ -128,19 +176,19 @@ class Gltf:
         row = dtype.itemsize * width
         step = stride or row
         if step < row:
-            raise ValueError(f"rows of {row} bytes every {step}")
+            raise DamagedFile(f"rows of {row} bytes every {step}")
         end = offset + step * (count - 1) + row
-        if count < 1 or offset < 0 or end > len(data):
-            raise ValueError(f"{count} elements end at byte {end} of the {len(data)} in bufferView {view}")
+        if count < 1 or end > len(data):
+            raise DamagedFile(f"{count} elements end at byte {end} of the {len(data)} in bufferView {view}")
         return np.ndarray((count, width), dtype, data, offset, (step, dtype.itemsize))
 
     def image(self, index: int) -> bytes:
-        """The bytes of an image file, embedded or beside the document. Raises ValueError where there are none."""
-        item = self.items("images")[index]
+        """The bytes of an image file, embedded or beside the document. Raises DamagedFile where there are none."""
+        item = self.item("images", index)
         if "bufferView" in item:
-            return self.view(item["bufferView"])
+            return bytes(self.view(item["bufferView"]))
         if "uri" not in item:
-            raise ValueError(f"image {index} has neither bufferView nor uri")
+            raise DamagedFile(f"image {index} has neither bufferView nor uri")
         return _resource(self.path, item["uri"])
 
     def mesh_arrays(self, mesh: int = 0, primitive: int = 0) -> tuple[NDArray[Any], NDArray[np.int64]]:
@@ -148,26 +196,55 @@ class Gltf:
 
         Strips and fans become triangles; points and lines have none. Raises NotReadHere for Draco's compression.
         """
-        item = self.items("meshes")[mesh]["primitives"][primitive]
-        if "KHR_draco_mesh_compression" in item.get("extensions", {}):
+        item = self.primitives(mesh)[primitive]
+        positions = self._positions(item)
+        if not len(positions):
+            return positions, np.empty((0, 3), np.int64)
+        indices = self._indices(item["indices"], len(positions)) if "indices" in item else np.arange(len(positions))
+        return positions, _triangles(indices, item.get("mode", 4))
+
+    def primitives(self, mesh: int) -> list[dict[str, Any]]:
+        """The primitives of a mesh."""
+        found: list[dict[str, Any]] = self.item("meshes", mesh)["primitives"]
+        return found
+
+    def _positions(self, primitive: dict[str, Any]) -> NDArray[Any]:
+        """(V, 3), none where a primitive has no positions."""
+        if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
             raise NotReadHere("compressed with Draco")
-        if "POSITION" not in item["attributes"]:
-            return np.empty((0, 3), np.float32), np.empty((0, 3), np.int64)
-        positions = self.numbers(item["attributes"]["POSITION"])
-        indices = self.accessor(item["indices"]) if "indices" in item else np.arange(len(positions))
-        return positions, _triangles(indices.astype(np.int64), item.get("mode", 4))
+        if "POSITION" not in primitive["attributes"]:
+            return np.empty((0, 3), np.float32)
+        return self.vectors(primitive["attributes"]["POSITION"], 3)
+
+    def vectors(self, accessor: int, width: int) -> NDArray[Any]:
+        """(N, width) `numbers` of an accessor. Raises DamagedFile where it has others."""
+        found = self.numbers(accessor)
+        if found.ndim != 2 or found.shape[1] != width:
+            raise DamagedFile(f"accessor {accessor} holds no vectors of {width}")
+        return found
+
+    def _indices(self, accessor: int, count: int) -> NDArray[np.int64]:
+        """(N,) indices below `count`."""
+        found = self.accessor(accessor)
+        if found.ndim != 1 or found.dtype.kind != "u":
+            raise DamagedFile(f"accessor {accessor} holds no indices")
+        if found.max() >= count:
+            raise DamagedFile(f"index {int(found.max())} of {count} vertices")
+        return found.astype(np.int64)
 
     def solid_arrays(self, mesh: int = 0) -> tuple[NDArray[Any], NDArray[Any]]:
         """Positions and triangles of a mesh with its seams undone.
 
         By EXT_mesh_manifold where the file has it, else by merging equal positions of all primitives.
         """
-        item = self.items("meshes")[mesh]
+        item = self.item("meshes", mesh)
         extension = item.get("extensions", {}).get("EXT_mesh_manifold")
         if extension is not None:
             primitive = extension["manifoldPrimitive"]
-            indices = self.accessor(primitive["indices"]).astype(np.int64)
-            return self.numbers(primitive["attributes"]["POSITION"]), indices.reshape(-1, 3)
+            positions = self._positions(primitive)
+            return positions, _triangles(self._indices(primitive["indices"], len(positions)), 4)
+        if not item["primitives"]:
+            raise DamagedFile(f"meshes/{mesh} has no primitives")
         parts = [self.mesh_arrays(mesh, primitive) for primitive in range(len(item["primitives"]))]
         starts = np.cumsum([0, *(len(positions) for positions, _ in parts)])
         positions = np.concatenate([positions for positions, _ in parts])
@@ -179,18 +256,20 @@ class Gltf:
         nodes, found = self.items("nodes"), []
         scenes = self.items("scenes")
         below = {child for node in nodes for child in node.get("children", [])}
-        roots = scenes[self.document.get("scene", 0)].get("nodes", []) if scenes else set(range(len(nodes))) - below
+        scene = self.item("scenes", self.document.get("scene") or 0) if scenes else {}
+        roots = scene.get("nodes", []) if scenes else set(range(len(nodes))) - below
         pending = [(index, np.eye(4)) for index in roots]
         met: set[int] = set()
         while pending:
             index, above = pending.pop()
             if index in met:
-                raise ValueError(f"node {index} has two parents, or nodes form a cycle")
+                raise DamagedFile(f"node {index} has two parents, or nodes form a cycle")
             met.add(index)
-            matrix = above @ _local_matrix(nodes[index])
-            if "mesh" in nodes[index]:
-                found.append((int(nodes[index]["mesh"]), matrix))
-            pending += [(child, matrix) for child in nodes[index].get("children", [])]
+            node = self.item("nodes", index)
+            matrix = above @ local_matrix(node)
+            if "mesh" in node:
+                found.append((node["mesh"], matrix))
+            pending += [(child, matrix) for child in node.get("children", [])]
         return found
 
     def scene_vertices(self) -> NDArray[np.float64]:
@@ -198,8 +277,8 @@ class Gltf:
         clouds = [np.empty((0, 3))]
         count = 0
         for mesh, matrix in self.instances():
-            for primitive in range(len(self.items("meshes")[mesh]["primitives"])):
-                vertices = self.mesh_arrays(mesh, primitive)[0]
+            for primitive in self.primitives(mesh):
+                vertices = self._positions(primitive)
                 count = _counted(count, len(vertices))
                 self._charge(vertices.size)
                 clouds.append(_moved(vertices, matrix))
@@ -233,6 +312,8 @@ def _moved(vertices: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[Any]:
 
 def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     """Corners (F, 3) of triangles, a strip or a fan, by the `mode` of the primitive; none for points and lines."""
+    if mode == 4 and len(indices) % 3:
+        raise DamagedFile(f"{len(indices)} indices are no triangles")
     if mode == 4:
         return indices.reshape(-1, 3)
     if mode not in (5, 6) or len(indices) < 3:
@@ -244,7 +325,14 @@ def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     return faces
 
 
-def _local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+def _dtype(component: int) -> np.dtype[Any]:
+    if component not in DTYPES:
+        raise DamagedFile(f"componentType {component}")
+    return np.dtype(DTYPES[component])
+
+
+def local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
+    """(4, 4) matrix that takes what is in a node to the node above; its quaternion is taken to be of length 1."""
     if "matrix" in node:
         return np.asarray(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
@@ -263,13 +351,14 @@ def _resource(path: Path, uri: str) -> bytes:
     if uri.startswith("data:"):
         import base64
 
-        return base64.b64decode(uri.partition(",")[2])
+        with decoding("no base64 in an address", ValueError):
+            return base64.b64decode(uri.partition(",")[2])
     try:
         return read_bytes(path.parent / unquote(uri), MAX_BYTES)
     except OSError as error:
-        raise ValueError(f"{uri[:80]} is not there ({error.strerror})") from error
-    except ValueError as error:
-        raise ValueError(f"{uri[:80]}: {error}") from error
+        raise DamagedFile(f"{uri[:80]} is not there ({error.strerror})") from error
+    except DamagedFile as error:
+        raise DamagedFile(f"{uri[:80]}: {error}") from error
 
 
 def read_gltf(path: Path | str) -> Gltf:
@@ -281,38 +370,41 @@ def read_gltf(path: Path | str) -> Gltf:
     path = Path(path)
     try:
         data = read_bytes(path, MAX_BYTES)
-        if path.suffix.lower() == ".gltf":
-            return _with_buffers(parse_json(data), None, path)
-        text, binary = _chunks(data)
-        return _with_buffers(parse_json(text), binary, path)
+        text, binary = (data, None) if path.suffix.lower() == ".gltf" else split_glb(data)
+        return _gltf(text, binary, path)
     except OSError as error:
         raise ExportError(path, f"no readable glTF ({error.strerror})", "check the name") from error
-    except DAMAGE as error:
+    except DamagedFile as error:
         raise ExportError(path, f"no readable glTF ({error})", "write it again") from error
 
 
-def _chunks(data: bytes) -> tuple[bytes, bytes | None]:
-    magic, version, length = struct.unpack_from("<4sII", data)
-    if magic != b"glTF" or version != 2:
-        raise ValueError(f"starts with {magic!r} version {version}, expected b'glTF' version 2")
-    if length != len(data):
-        raise ValueError(f"header says {length} bytes, file has {len(data)}")
-    chunks: list[bytes] = []
-    place = 12
-    for kind in (b"JSON", b"BIN\0"):
-        if place == length:
-            break
-        size, found = struct.unpack_from("<I4s", data, place)
-        if found != kind or size % 4 or place + 8 + size > length:
-            raise ValueError(f"chunk at byte {place} is {found!r} of {size} bytes, expected {kind!r} within the file")
-        chunks.append(data[place + 8 : place + 8 + size])
-        place += 8 + size
-    return chunks[0], chunks[1] if len(chunks) > 1 else None
+def open_glb(path: Path) -> Gltf:
+    """A .glb file mapped into memory: its JSON is parsed, its buffer read where `view` and `accessor` look.
+
+    `view` gives memoryviews, valid as long as the record. Raises ExportError for what is no binary glTF.
+    """
+    try:
+        return glb_of(mapped(path), path)
+    except OSError as error:
+        raise ExportError(path, f"no readable glTF ({error.strerror})", "check the name") from error
+    except DamagedFile as error:
+        raise ExportError(path, f"no readable glTF ({error})", "check the name") from error
 
 
-def _with_buffers(document: dict[str, Any], binary: bytes | None, path: Path) -> Gltf:
-    if not isinstance(document, dict):
-        raise ValueError("the document is not a JSON object")
+def glb_of(data: Bytes, path: Path) -> Gltf:
+    """The record of a .glb file's bytes; path : for messages. Raises ExportError for what is no binary glTF."""
+    try:
+        gltf = _gltf(*split_glb(data), path)
+        if any("uri" in item for item in gltf.items("buffers")):
+            raise DamagedFile("keeps its buffers in other files")
+        return gltf
+    except DamagedFile as error:
+        raise ExportError(path, f"no readable glTF ({error})", "give a .glb") from error
+
+
+def _gltf(text: Bytes, binary: Bytes | None, path: Path) -> Gltf:
+    document = parse_json(text)
+    check_shape(document, DOCUMENT)
     buffers = []
     for index, item in enumerate(document.get("buffers", [])):
         if "uri" not in item and any(item.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT):
@@ -320,6 +412,6 @@ def _with_buffers(document: dict[str, Any], binary: bytes | None, path: Path) ->
             continue
         data = _resource(path, item["uri"]) if "uri" in item else binary
         if data is None or len(data) < item["byteLength"]:
-            raise ValueError(f"buffer {index} has {len(data or b'')} bytes, expected {item['byteLength']}")
-        buffers.append(data)
+            raise DamagedFile(f"buffer {index} has {len(data or b'')} bytes, expected {item['byteLength']}")
+        buffers.append(cast(bytes, data))
     return Gltf(document, tuple(buffers), path)

@@ -11,15 +11,15 @@ from __future__ import annotations
 import itertools
 import json
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from exporters.errors import ExportError
-from exporters.gltf.container import glb_of
-from exporters.gltf.reader import Gltf
+from exporters.gltf.container import join_glb
+from exporters.gltf.reader import Gltf, glb_of
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 HEADER = struct.Struct("<4sIIIIII")
@@ -43,9 +43,16 @@ def b3dm_bytes(glb: bytes, name: Path | str) -> bytes:
     Raises ExportError for what is no binary glTF, or needs extensions to be read.
     """
     gltf = glb_of(glb, Path(name))
+    try:
+        return _b3dm(gltf)
+    except DamagedFile as error:
+        raise ExportError(name, f"broken glTF ({error})", "see validate") from error
+
+
+def _b3dm(gltf: Gltf) -> bytes:
     required = gltf.document.get("extensionsRequired", [])
     if required:
-        raise ExportError(name, f"needs {', '.join(required)}, newer than 3D Tiles 1.0", "give a plain .glb")
+        raise ExportError(gltf.path, f"needs {', '.join(required)}, newer than 3D Tiles 1.0", "give a plain .glb")
     columns = _batch_table(gltf)
     length = max((len(values) for values in columns.values()), default=0)
     feature_table = _json({"BATCH_LENGTH": length}, HEADER.size)
@@ -63,22 +70,22 @@ def _json(content: dict[str, Any], before: int) -> bytes:
 
 def part_table(gltf: Gltf) -> dict[str, list[Any]]:
     """The columns of the one property table of a figure, property → values; empty where there is none."""
-    metadata = gltf.document.get("extensions", {}).get(STRUCTURAL_METADATA, {})
-    tables = metadata.get("propertyTables", [])
-    if len(tables) != 1:
+    if len(gltf.tables) != 1:
         return {}
-    table = tables[0]
-    kinds = metadata["schema"]["classes"][table["class"]]["properties"]
+    table = gltf.tables[0]
+    classes = gltf.extension(STRUCTURAL_METADATA).get("schema", {}).get("classes", {})
+    kinds = classes.get(table["class"], {}).get("properties", {})
     columns: dict[str, list[Any]] = {}
     for key, column in table.get("properties", {}).items():
-        kind, data = kinds[key], bytes(gltf.view(column["values"]))
+        if key not in kinds:
+            raise DamagedFile(f"property {key[:40]} is not in the schema")
+        kind = kinds[key]
         if kind.get("array"):
             continue  # a batch table of 1.0 has no binary arrays, and figures have none
         if kind["type"] == "STRING":
-            offsets = np.frombuffer(gltf.view(column["stringOffsets"]), "<u4").tolist()
-            columns[key] = [data[begin:end].decode() for begin, end in itertools.pairwise(offsets)]
-        elif kind["type"] == "SCALAR" and kind["componentType"] in SCALARS:
-            values = np.frombuffer(data, SCALARS[kind["componentType"]])[: table["count"]]
+            columns[key] = gltf.texts(column)
+        elif kind["type"] == "SCALAR" and kind.get("componentType") in SCALARS:
+            values = gltf.column(column["values"], SCALARS[kind["componentType"]])[: table["count"]]
             # The shortest decimals that give the same float32 back.
             columns[key] = [float(str(value)) if values.dtype.kind == "f" else int(value) for value in values]
     return columns
@@ -86,8 +93,8 @@ def part_table(gltf: Gltf) -> dict[str, list[Any]]:
 
 def _batch_table(gltf: Gltf) -> dict[str, list[Any]]:
     primitives = [each for mesh in gltf.items("meshes") for each in mesh["primitives"]]
-    features = [each.get("extensions", {}).get(MESH_FEATURES, {}).get("featureIds", [{}])[0] for each in primitives]
-    whole = all(each.get("propertyTable") == 0 and each.get("attribute") == 0 for each in features)
+    lists = [each.get("extensions", {}).get(MESH_FEATURES, {}).get("featureIds") or [{}] for each in primitives]
+    whole = all(ids[0].get("propertyTable") == 0 and ids[0].get("attribute") == 0 for ids in lists)
     return part_table(gltf) if whole else {}
 
 
@@ -123,9 +130,7 @@ def _rewritten(gltf: Gltf, batched: bool) -> bytes:
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
     # Both chunks fill multiples of eight bytes, as the whole tile has to; the headers of the chunks add 12 + 8 + 8.
     text += b" " * ((4 - len(text)) % 8)
-    length = 12 + 8 + len(text) + 8 + len(binary)
-    head = struct.pack("<4sII", b"glTF", 2, length) + struct.pack("<I4s", len(text), b"JSON")
-    return b"".join([head, text, struct.pack("<I4s", len(binary), b"BIN\0"), binary])
+    return join_glb(text, binary)
 
 
 def _without_images_of(document: dict[str, Any], property_textures: list[dict[str, Any]]) -> set[int]:
@@ -134,9 +139,11 @@ def _without_images_of(document: dict[str, Any], property_textures: list[dict[st
     returns : the buffer views of those images
     """
     views: set[int] = set()
-    wanted = {each["index"] for holder in property_textures for each in holder.get("properties", {}).values()}
+    wanted = {each.get("index", 0) for holder in property_textures for each in holder.get("properties", {}).values()}
     for index in sorted(wanted, reverse=True):
         textures, images, samplers = (document.get(kind, []) for kind in ("textures", "images", "samplers"))
+        if index >= len(textures):
+            raise DamagedFile(f"there is no texture {index}")
         texture = textures[index]
         # Others would have to be renumbered; ours come last.
         if (index, texture.get("source"), texture.get("sampler")) != tuple(
@@ -166,6 +173,8 @@ def _repacked(document: dict[str, Any], gltf: Gltf, dropped: set[int]) -> bytes:
         length += len(padded)
         views.append(view)
     document["bufferViews"] = views
+    if any(view not in number for view in _named_views(document)):
+        raise DamagedFile("a buffer view is named that is not there, or that held a property table")
     for accessor in document.get("accessors", []):
         sparse = accessor.get("sparse", {})
         for holder in (accessor, sparse.get("indices", {}), sparse.get("values", {})):
@@ -175,6 +184,15 @@ def _repacked(document: dict[str, Any], gltf: Gltf, dropped: set[int]) -> bytes:
         if "bufferView" in image:
             image["bufferView"] = number[image["bufferView"]]
     return b"".join(chunks)
+
+
+def _named_views(document: dict[str, Any]) -> Iterator[int]:
+    for accessor in document.get("accessors", []):
+        sparse = accessor.get("sparse", {})
+        for holder in (accessor, sparse.get("indices", {}), sparse.get("values", {})):
+            if "bufferView" in holder:
+                yield holder["bufferView"]
+    yield from (image["bufferView"] for image in document.get("images", []) if "bufferView" in image)
 
 
 @dataclass(frozen=True)
@@ -187,19 +205,19 @@ class B3dm:
 
 
 def read_b3dm(data: bytes) -> B3dm:
-    """Take a batched 3D model apart. Raises ValueError where header, lengths or alignment break the rules."""
+    """Take a batched 3D model apart. Raises DamagedFile where header, lengths or alignment break the rules."""
     if len(data) < HEADER.size:
-        raise ValueError(f"{len(data)} bytes, less than the header")
+        raise DamagedFile(f"{len(data)} bytes, less than the header")
     magic, version, total, *lengths = HEADER.unpack_from(data)
     if magic != b"b3dm" or version != 1:
-        raise ValueError(f"starts with {magic!r} version {version}, expected b'b3dm' version 1")
+        raise DamagedFile(f"starts with {magic!r} version {version}, expected b'b3dm' version 1")
     if total != len(data) or sum(lengths) + HEADER.size > total:
-        raise ValueError(f"header says {total} bytes with tables of {lengths}, file has {len(data)}")
+        raise DamagedFile(f"header says {total} bytes with tables of {lengths}, file has {len(data)}")
     ends = [HEADER.size + end for end in itertools.accumulate(lengths)]
     if total % 8 or ends[1] % 8 or ends[3] % 8:
-        raise ValueError(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
+        raise DamagedFile(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
     feature_table = parse_json(data[HEADER.size : ends[0]])
     batch_table = parse_json(data[ends[1] : ends[2]]) if lengths[2] else {}
     if not isinstance(feature_table, dict) or not isinstance(batch_table, dict):
-        raise ValueError("a table is no JSON object")
+        raise DamagedFile("a table is no JSON object")
     return B3dm(feature_table, batch_table, data[ends[3] :])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,11 @@ from exporters.georeference import placement_of_record
 from exporters.tiles.check_content import Content, read_content
 from exporters.tiles.check_metadata import check_entity, read_schema
 from exporters.tiles.volumes import Matrix, Volume, read_transform, volume_problem
+from georef.errors import PlacementError
 from georef.geodesy import ecef_from_tile
+from georef.untrusted.damage import DamagedFile, decoding
 from georef.untrusted.json_file import is_there, read_json
+from georef.untrusted.json_shape import Needed, check_shape
 
 INSIDE_TOLERANCE_M = 1e-6
 """Vertices this far outside a volume pass: float64 ECEF coordinates are good to 1e-9 m, boxes may be shared."""
@@ -39,6 +43,14 @@ MAX_SAME_FILE = 20
 
 SINCE_1_1 = ("schema", "schemaUri", "metadata", "groups", "contents", "implicitTiling")
 
+_CONTENT = {"uri": str, "url": str}
+_TILE: dict[str, Any] = {"content": _CONTENT, "contents": [_CONTENT]}
+_TILE["children"] = [_TILE]
+
+TILESET = {"asset": dict, "root": Needed(_TILE), "groups": list, "extensionsRequired": [str]}
+"""What is taken for granted of a tileset; numbers are checked one by one, as what is wrong with them is worth a
+finding."""
+
 
 def check_tileset(path: Path, external: bool = True) -> list[Finding]:
     """Findings about a tileset and all it refers to.
@@ -51,9 +63,14 @@ def check_tileset(path: Path, external: bool = True) -> list[Finding]:
 
 def read_tileset(path: Path) -> dict[str, Any]:
     """The document of a tileset. Raises ExportError for a file that is not there or no tileset."""
-    document = read_json(path, "give a tileset.json of 3D Tiles", ExportError)
+    remedy = "give a tileset.json of 3D Tiles"
+    document: dict[str, Any] = read_json(path, remedy, ExportError)
     if not isinstance(document, dict) or not isinstance(document.get("root"), dict):
-        raise ExportError(path, "no root tile", "give a tileset.json of 3D Tiles")
+        raise ExportError(path, "no root tile", remedy)
+    try:
+        check_shape(document, TILESET)
+    except DamagedFile as error:
+        raise ExportError(path, str(error), remedy) from error
     return document
 
 
@@ -149,7 +166,8 @@ class _Walk:
             yield Finding("error", "BOUNDING_VOLUME", problem, where)
         else:
             volume = Volume(tile["boundingVolume"], matrix, where)
-            out = volumes[-1].holds(volume) if volumes else 0.0
+            with _measuring():
+                out = volumes[-1].holds(volume) if volumes else 0.0
             if out > CHILD_TOLERANCE_M:
                 # Legal, as only content has to be inside; ours keep to more.
                 severity: Severity = "warning" if self.ours else "info"
@@ -202,7 +220,8 @@ class _Walk:
             yield Finding("warning", "VERSION_1_1", "glTF is no content of version 1.0", where)
         if content.points is not None and len(content.points):
             for volume in here.volumes:
-                outside = volume.outside(content.points, here.matrix)
+                with _measuring():
+                    outside = volume.outside(content.points, here.matrix)
                 if outside > INSIDE_TOLERANCE_M:
                     message = f"{uri}: vertices up to {outside:.3g} m outside the bounding volume"
                     yield Finding("error", "OUTSIDE_VOLUME", message, volume.where)
@@ -215,7 +234,7 @@ def _check_place(content: Content, here: _Above, where: str) -> Iterator[Finding
         return
     try:
         wanted = ecef_from_tile(placement_of_record(content.georeference)).matrix
-    except ValueError as error:
+    except (DamagedFile, PlacementError) as error:
         yield Finding("warning", "PLACE", str(error), where)
         return
     away = float(np.linalg.norm(here.matrix[:3, 3] - wanted[:3, 3]))
@@ -227,6 +246,10 @@ def _check_place(content: Content, here: _Above, where: str) -> Iterator[Finding
     elif away > PLACE_TOLERANCE_M or turn > TURN_TOLERANCE_DEG:
         message = f"{away:.3g} m and {turn:.3g} degrees from the place that its file records"
         yield Finding("error", "PLACE", message, where)
+
+
+def _measuring() -> AbstractContextManager[None]:
+    return decoding("a volume of numbers that are too large", PlacementError, np.linalg.LinAlgError)
 
 
 def _geometric_error(item: dict[str, Any]) -> float | None:

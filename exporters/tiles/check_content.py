@@ -15,7 +15,9 @@ from exporters.findings import Finding
 from exporters.gltf.check import check_gltf
 from exporters.gltf.reader import MAX_BYTES, read_gltf
 from exporters.tiles.b3dm import B3dm, read_b3dm
+from exporters.tiles.volumes import numbers
 from georef.geodesy import tile_from_asset
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import read_bytes
 
 UNCHECKED = {
@@ -68,23 +70,22 @@ def _mesh(file: Path, findings: tuple[Finding, ...], up_axis: str) -> Content:
     try:
         gltf = read_gltf(file)
         vertices = gltf.scene_vertices()
-    except (ExportError, ValueError, LookupError, TypeError):
+    except (ExportError, DamagedFile):
         return Content("mesh", findings)  # check_gltf has said so
-    center = gltf.document.get("extensions", {}).get("CESIUM_RTC", {}).get("center", [0.0, 0.0, 0.0])
+    center = gltf.extension("CESIUM_RTC").get("center", [0.0, 0.0, 0.0])
     points = vertices + np.asarray(center, dtype=np.float64)
     if up_axis == "X":
         points = np.stack([-points[:, 2], points[:, 1], points[:, 0]], axis=1)
     elif up_axis != "Z":
         points = tile_from_asset().apply(points)
-    extras = gltf.document.get("asset", {}).get("extras", {})
-    record = extras.get("georeference") if isinstance(extras, dict) else None
+    record = gltf.extras.get("georeference")
     return Content("mesh", findings, points, record if isinstance(record, dict) else None)
 
 
 def _b3dm(file: Path, external: bool, up_axis: str) -> Content:
     try:
         tile = read_b3dm(read_bytes(file, MAX_BYTES))
-    except (OSError, ValueError) as error:
+    except (OSError, DamagedFile) as error:
         return Content("mesh", (Finding("error", "B3DM", str(error), file.name),))
     with tempfile.TemporaryDirectory(prefix="fig2mesh-") as folder:
         inner = Path(folder) / f"{file.name}.glb"
@@ -95,7 +96,9 @@ def _b3dm(file: Path, external: bool, up_axis: str) -> Content:
         findings = content.findings + tuple(_check_batches(tile, inner, file.name))
     points = content.points
     center = tile.feature_table.get("RTC_CENTER")
-    if points is not None and isinstance(center, list):
+    if center is not None and not numbers(center, 3):
+        findings += (Finding("error", "B3DM", "RTC_CENTER is not 3 numbers", file.name),)
+    elif points is not None and center is not None:
         points = points + np.asarray(center, dtype=np.float64)
     return Content("mesh", findings, points, content.georeference)
 
@@ -119,6 +122,6 @@ def _check_batches(tile: B3dm, glb: Path, name: str) -> list[Finding]:
                 ids = gltf.accessor(accessor)
                 if ids.min() < 0 or ids.max() >= length or (ids != np.rint(ids)).any():
                     findings.append(Finding("error", "BATCH_ID", f"batch ids outside 0..{length - 1}", name))
-    except (ExportError, ValueError, LookupError, TypeError):
+    except (ExportError, DamagedFile):
         pass  # check_gltf has said so
     return findings

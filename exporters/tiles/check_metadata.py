@@ -14,9 +14,19 @@ from urllib.parse import unquote
 
 from exporters.errors import ExportError
 from exporters.findings import Finding
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import read_json
+from georef.untrusted.json_shape import WHOLE, Needed, Values, check_shape
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+_PROPERTY = {"type": str, "componentType": str, "array": bool, "count": WHOLE, "required": bool, "enumType": str}
+
+SCHEMA = {
+    "classes": Values({"properties": Values(_PROPERTY)}),
+    "enums": Values({"values": [{"name": str}]}),
+}
+"""What is taken for granted of a schema."""
 
 
 def read_schema(document: dict[str, Any], path: Path) -> tuple[dict[str, Any] | None, list[Finding]]:
@@ -33,8 +43,10 @@ def read_schema(document: dict[str, Any], path: Path) -> tuple[dict[str, Any] | 
             return None, [Finding("error", "SCHEMA", f"{uri} cannot be read ({error.finding})", name)]
     if schema is None:
         return None, []
-    if not isinstance(schema, dict) or not isinstance(schema.get("classes", {}), dict):
-        return None, [Finding("error", "SCHEMA", "the schema is no object with classes", name)]
+    try:
+        check_shape(schema, SCHEMA, "schema")
+    except DamagedFile as error:
+        return None, [Finding("error", "SCHEMA", str(error), name)]
     return schema, [] if "id" in schema else [Finding("error", "SCHEMA_ID", "the schema has no id", name)]
 
 
@@ -43,10 +55,12 @@ def check_entity(entity: Any, schema: dict[str, Any] | None, where: str) -> Iter
 
     entity : {"class", "properties"}; schema : that of its tileset, None if it has none
     """
-    if not isinstance(entity, dict):
-        yield Finding("error", "METADATA", "metadata is no object", where)
+    try:
+        check_shape(entity, {"class": Needed(str), "properties": dict}, "metadata")
+    except DamagedFile as error:
+        yield Finding("error", "METADATA", str(error), where)
         return
-    name = entity.get("class")
+    name = entity["class"]
     found = (schema or {}).get("classes", {}).get(name)
     if found is None:
         yield Finding("error", "METADATA", f"class {name} is not in the schema", where)
@@ -103,7 +117,7 @@ def _fits_component(value: Any, component: str) -> bool:
         return True
     unsigned = component.startswith("UINT")
     bits = component.removeprefix("UINT").removeprefix("INT")
-    if not bits.isdigit() or value != int(value):
+    if bits not in ("8", "16", "32", "64") or value != int(value):
         return False
     low, high = (0, 2 ** int(bits)) if unsigned else (-(2 ** (int(bits) - 1)), 2 ** (int(bits) - 1))
     return bool(low <= value < high)

@@ -94,7 +94,7 @@ def volume_problem(volume: Any) -> str:
     if "box" in volume:
         if not numbers(volume["box"], 12):
             return "box is not 12 finite numbers"
-        axes = np.array(volume["box"][3:]).reshape(3, 3)
+        axes = np.array(volume["box"][3:], np.float64).reshape(3, 3)
         return "" if abs(np.linalg.det(axes)) > 0 else "box is flat"
     if "sphere" in volume:
         return "" if numbers(volume["sphere"], 4) and volume["sphere"][3] > 0 else "sphere is not 4 numbers"

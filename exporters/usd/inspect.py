@@ -14,6 +14,7 @@ from exporters.texture_files import texture_size
 from exporters.usd.check import open_stage, reason_of, variations
 from exporters.usd.place import anchor_of, heading_of
 from exporters.usd.stage import VARIANT_SET
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 FORMATS = {".usda": "OpenUSD text", ".usdc": "OpenUSD binary", ".usdz": "OpenUSD package"}
@@ -104,7 +105,7 @@ def _triangles(mesh: Any, root: Any) -> tuple[NDArray[np.float64], NDArray[np.in
     counts = np.array(mesh.GetFaceVertexCountsAttr().Get(first) or [], dtype=np.int64)
     indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(first) or [], dtype=np.int64)
     if len(indices) != counts.sum() or (len(indices) and (indices.min() < 0 or indices.max() >= len(points))):
-        raise ValueError("faces name points that are not there")
+        raise DamagedFile("faces name points that are not there")
     cache = UsdGeom.XformCache(first)
     matrix = cache.GetLocalToWorldTransform(mesh.GetPrim())
     if root:

@@ -12,18 +12,25 @@ import signal
 import subprocess
 import sys
 import tempfile
+import traceback
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from exporters.errors import DAMAGE, ExportError
+from exporters.errors import ExportError
 from exporters.findings import Finding
+from georef.errors import PlacementError
+from georef.untrusted.damage import DamagedFile
 
 TIMEOUT_S = 300
 """Of large stages the validators of USD take a minute."""
 
 MAX_MEMORY = 8 << 30
 """Of the process's addresses, where the system can limit them."""
+
+
+class UsdFault(RuntimeError):
+    """A fault of ours in the process that reads USD, with the place where it was raised."""
 
 
 def check_usd_apart(path: Path) -> list[Finding]:
@@ -55,6 +62,8 @@ def _asked(question: str, path: Path) -> Any:
     answer = json.loads(run.stdout)
     if "error" in answer:
         raise ExportError(path, answer["error"]["finding"], answer["error"]["remedy"])
+    if "fault" in answer:
+        raise UsdFault(f"{answer['fault']}\n{answer['where']}")
     return answer["found"]
 
 
@@ -67,9 +76,12 @@ def _answer(question: str, path: Path) -> dict[str, Any]:
         return {"found": found}
     except ExportError as error:
         return {"error": {"finding": error.finding, "remedy": error.remedy}}
-    except DAMAGE as error:
-        reason = " ".join(str(error).split())[:120]
-        return {"error": {"finding": f"damaged ({type(error).__name__}: {reason})", "remedy": "write it again"}}
+    except (DamagedFile, PlacementError) as error:
+        return {"error": {"finding": f"damaged ({error})", "remedy": "write it again"}}
+    except OSError as error:  # also of places in a package that no file can have
+        return {"error": {"finding": error.strerror or "cannot be read", "remedy": "write it again"}}
+    except Exception as error:
+        return {"fault": f"{type(error).__name__}: {error}", "where": traceback.format_exc()}
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from exporters.atomic_file import write_text
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 WORK: Final = ".fig2mesh"
@@ -43,9 +44,12 @@ class Ledger:
         except (OSError, UnicodeDecodeError):
             return dict(DAMAGED)
         try:
-            record, digest = parse_json(text)
-        except (ValueError, TypeError):
+            document = parse_json(text)
+        except DamagedFile:
             return dict(DAMAGED)
+        if not isinstance(document, list) or len(document) != 2:
+            return dict(DAMAGED)
+        record, digest = document
         return record if isinstance(record, dict) and _digest(record) == digest else dict(DAMAGED)
 
     def write(self, name: str, record: dict[str, Any]) -> None:

@@ -42,8 +42,6 @@ class Roots:
         except OSError as error:  # also loops of links, and names that are too long
             raise InputError(f"column {column}", f"{shown}: {error.strerror}", "check the path") from None
         except ValueError as error:
-            if isinstance(error, InputError):
-                raise
             raise InputError(f"column {column}", f"{shown!r} is no path ({error})", "check the path") from None
         return whole
 

@@ -16,7 +16,7 @@ from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
 from fig2mesh.batch.resolved_row import ResolvedRow
 from fig2mesh.batch.row_files import digest_of
 from fig2mesh.batch.task import Batch, Outcome, Task
-from fig2mesh.errors import FigureError, InputError, OutputError
+from fig2mesh.errors import InputError, OutputError
 
 if TYPE_CHECKING:
     from exporters.asset import Asset
@@ -78,7 +78,7 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
             fault = error
             # What the disk refuses may go well next time; what is wrong with the input will not.
             record |= {"status": "failed", "error": batch.roots.shorten(_line(error))}
-            record["lasting"] = "key" in record and isinstance(error, FigureError)
+            record["lasting"] = "key" in record and error.lasting
         except Exception as error:
             fault = error
             found = f"internal error: {type(error).__name__}: {_line(error)}"

@@ -17,6 +17,7 @@ from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.row_files import digest_of, stand
 from fig2mesh.batch.task import Task
 from fig2mesh.batch.tasks import read_spool
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
@@ -173,7 +174,7 @@ def _state_path(folder: Path) -> Path:
 
 def _before(folder: Path) -> dict[str, Any]:
     """What the last run wrote here; nothing where that is not known."""
-    with suppress(OSError, ValueError):
+    with suppress(OSError, DamagedFile):
         found = parse_json(_state_path(folder).read_bytes())
         if isinstance(found, dict) and isinstance(found.get("files"), dict):
             return {"digest": found.get("digest"), "files": found["files"]}

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from exporters.atomic_file import atomic_path
-from exporters.errors import DAMAGE
 from fig2mesh.conversion.record_types import check_fields, fits, records_in
 from fig2mesh.errors import FigureError
+from georef.untrusted.damage import DamagedFile, decoding
 from georef.untrusted.json_file import parse_json
+from georef.untrusted.json_shape import check_shape
 from georef.untrusted.npz_file import read_arrays, text_of
 
 REMEDY = "run again with --save-stages and without --resume-from"
@@ -44,17 +45,18 @@ def read_record(path: Path, title: str, kind: Any) -> Any:
     """
     try:
         arrays = read_arrays(path)
+        if not {"__stage__", "__tree__"} <= arrays.keys():
+            raise DamagedFile("it has no tree of records")
         if (found := text_of(arrays.pop("__stage__"))) != title:
-            raise ValueError(f"it holds {found[:40]}")
+            raise DamagedFile(f"it holds {found[:40]}")
         value = _unpack(parse_json(text_of(arrays.pop("__tree__"))), arrays, records_in(kind))
         if not fits(value, kind):
-            raise TypeError(f"it holds a {type(value).__name__}")
+            raise DamagedFile(f"it holds a {type(value).__name__}")
         return value
     except OSError as error:
         raise FigureError(path, error.strerror or "cannot be read", REMEDY) from None
-    except DAMAGE as error:
-        reason = " ".join(str(error).split())[:80] or type(error).__name__
-        raise FigureError(path, f"not a stage file of this version ({reason})", REMEDY) from None
+    except DamagedFile as error:
+        raise FigureError(path, f"not a stage file of this version ({str(error)[:80]})", REMEDY) from None
 
 
 def _pack(value: Any, arrays: dict[str, Any]) -> Any:
@@ -74,20 +76,32 @@ def _pack(value: Any, arrays: dict[str, Any]) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be kept in a stage file")
 
 
+NODE = {"record": str, "fields": dict, "array": str, "tuple": list, "dict": [list]}
+"""A node of the tree, by the one key that it has."""
+
+
 def _unpack(tree: Any, arrays: dict[str, Any], classes: dict[str, type]) -> Any:
     if not isinstance(tree, dict):
-        raise TypeError(f"a {type(tree).__name__} in its tree")
+        raise DamagedFile(f"a {type(tree).__name__} in its tree")
+    check_shape(tree, NODE)
     if "record" in tree:
+        if tree["record"] not in classes:
+            raise DamagedFile(f"a record of kind {tree['record'][:40]}")
         kind = classes[tree["record"]]
-        fields = {name: _unpack(item, arrays, classes) for name, item in tree["fields"].items()}
+        fields = {name: _unpack(item, arrays, classes) for name, item in tree.get("fields", {}).items()}
         check_fields(kind, fields)
-        return kind(**fields)
+        with decoding(kind.__name__, ValueError, LookupError):  # records refuse shapes that do not belong together
+            return kind(**fields)
     if "array" in tree:
+        if tree["array"] not in arrays:
+            raise DamagedFile(f"no array {tree['array'][:40]}")
         return arrays[tree["array"]]
     if "tuple" in tree:
         return tuple(_unpack(item, arrays, classes) for item in tree["tuple"])
     if "dict" in tree:
+        if not all(len(pair) == 2 and not isinstance(pair[0], dict | list) for pair in tree["dict"]):
+            raise DamagedFile("a dictionary that is none")
         return {key: _unpack(item, arrays, classes) for key, item in tree["dict"]}
-    if isinstance(tree["value"], dict | list):
-        raise TypeError("a value that is none")
+    if "value" not in tree or isinstance(tree["value"], dict | list):
+        raise DamagedFile("a value that is none")
     return tree["value"]

@@ -10,24 +10,35 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from georef.untrusted.damage import DamagedFile
+
 
 @functools.cache
 def _hints(kind: type) -> dict[str, Any]:
     return get_type_hints(kind)
 
 
+@functools.cache
+def _needed(kind: type) -> frozenset[str]:
+    none = dataclasses.MISSING
+    fields = dataclasses.fields(kind)
+    return frozenset(each.name for each in fields if each.default is none and each.default_factory is none)
+
+
 def check_fields(kind: type, fields: Mapping[str, Any]) -> None:
-    """Raise TypeError unless the fields are those of a dataclass and each fits its annotation.
+    """Raise DamagedFile unless the fields are those of a dataclass and each fits its annotation.
 
     Arrays have to have the type that is annotated; their shapes are for the record itself to check.
     """
     hints = _hints(kind)
     known = {field.name for field in dataclasses.fields(kind)}
     if unknown := fields.keys() - known:
-        raise TypeError(f"{kind.__name__} has no {sorted(map(str, unknown))[0][:40]}")
+        raise DamagedFile(f"{kind.__name__} has no {sorted(map(str, unknown))[0][:40]}")
+    if missing := _needed(kind) - fields.keys():
+        raise DamagedFile(f"{kind.__name__} without {sorted(missing)[0]}")
     for name, value in fields.items():
         if not fits(value, hints[name]):
-            raise TypeError(f"{kind.__name__}.{name} is {type(value).__name__}")
+            raise DamagedFile(f"{kind.__name__}.{name} is {type(value).__name__}")
 
 
 def fits(value: Any, hint: Any) -> bool:

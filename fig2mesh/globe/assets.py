@@ -12,14 +12,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
-from urllib.parse import unquote, urlsplit
+from urllib.parse import SplitResult, unquote, urlsplit
 
-from exporters.errors import DAMAGE
 from exporters.georeference import placement_of_record
 from exporters.gltf.reader import Gltf, read_gltf
+from exporters.tiles.check import TILESET
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
+from georef.untrusted.damage import DamagedFile, decoding
 from georef.untrusted.json_file import is_there, read_json
+from georef.untrusted.json_shape import Needed, check_shape
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
@@ -83,28 +85,24 @@ def _read(path: Path) -> GlobeAsset:
         raise InputError(path, f"a globe shows no {path.suffix or 'file without a suffix'}", remedy)
     try:
         found = {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
-        json.dumps(found.facts, allow_nan=False)  # files may hold numbers that no page can
+        with decoding("what no page can hold", ValueError, RecursionError):
+            json.dumps(found.facts, allow_nan=False)
         return found
-    except DAMAGE as error:
-        if isinstance(error, InputError):
-            raise
-        reason = " ".join(str(error).split())[:120]
-        raise InputError(path, f"damaged ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
+    except DamagedFile as error:
+        raise InputError(path, f"damaged ({error})", "see fig2mesh validate") from error
 
 
 def _model(path: Path) -> GlobeAsset:
     gltf = read_gltf(path)
-    asset = gltf.document.get("asset", {})
-    extras = asset.get("extras", {})
-    record = extras.get("georeference")
+    record = gltf.extras.get("georeference")
     if record is None:
         raise InputError(path, "has no place on the earth", "write it with --lonlat, or show it as 3D Tiles or CZML")
     place = placement_of_record(record)
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
     facts = {
         "name": path.stem,
-        "credit": str(asset.get("copyright", "")),
-        "metadata": extras.get("metadata", {}),
+        "credit": gltf.document.get("asset", {}).get("copyright", ""),
+        "metadata": gltf.extras.get("metadata", {}),
         # CesiumJS turns models so that they face east at heading 0.
         "place": record | {"entity_heading_deg": cesium_entity_heading_deg(place)},
         "triangles": sum(_triangles(gltf, mesh) for mesh, _ in gltf.instances()),
@@ -114,9 +112,10 @@ def _model(path: Path) -> GlobeAsset:
 
 def _triangles(gltf: Gltf, mesh: int) -> int:
     count = 0
-    for primitive in gltf.items("meshes")[mesh]["primitives"]:
-        accessor = primitive.get("indices", primitive["attributes"]["POSITION"])
-        count += gltf.items("accessors")[accessor]["count"] // 3 if primitive.get("mode", 4) == 4 else 0
+    for primitive in gltf.primitives(mesh):
+        accessor = primitive.get("indices", primitive["attributes"].get("POSITION"))
+        if accessor is not None and primitive.get("mode", 4) == 4:
+            count += gltf.item("accessors", accessor)["count"] // 3
     return count
 
 
@@ -124,18 +123,20 @@ def _tileset(path: Path) -> GlobeAsset:
     document = _json(path)
     if not isinstance(document, dict) or "root" not in document or "asset" not in document:
         raise InputError(path, "is no tileset", "give a tileset.json of 3D Tiles, or .geojson, .czml, .glb")
+    check_shape(document, {"asset": dict, "metadata": {"properties": dict}})
     needs, pending, folder = [], [(path, "")], path.parent
     seen = {path.resolve()}
     while pending:
         file, prefix = pending.pop()
         for uri in _contents(file):
-            relative = prefix + unquote(urlsplit(uri).path)
+            parts = _split(uri)
+            relative = prefix + unquote(parts.path)
             target = folder / relative
-            if urlsplit(uri).scheme or urlsplit(uri).netloc:
+            if parts.scheme or parts.netloc:
                 raise InputError(file, f"its content {uri[:80]} is elsewhere", "give a tileset whose files are here")
+            _check_there(target, file)
             if target.resolve() in seen:
                 continue
-            _check_there(target, file)
             seen.add(target.resolve())
             needs.append(relative)
             if target.suffix.lower() == ".json":
@@ -155,19 +156,23 @@ def _tileset(path: Path) -> GlobeAsset:
 
 
 def _contents(path: Path) -> Iterator[str]:
-    pending = [_json(path)["root"]]
+    document = _json(path)
+    check_shape(document, TILESET)
+    pending: list[dict[str, Any]] = [document["root"]]
     while pending:
         tile = pending.pop()
         if "implicitTiling" in tile:
             raise InputError(path, "its tiles are implicit", "give a tileset that lists its tiles")
         for content in [tile["content"]] if "content" in tile else tile.get("contents", []):
+            check_shape(content, {"url" if "uri" not in content else "uri": Needed(str)}, "content")
             yield content["uri"] if "uri" in content else content["url"]  # url: 3D Tiles 0.0
         pending += tile.get("children", [])
 
 
 def _czml(path: Path) -> GlobeAsset:
     packets = _json(path)
-    if not isinstance(packets, list) or not packets or packets[0].get("id") != "document":
+    check_shape(packets, [{"model": dict}])
+    if not packets or packets[0].get("id") != "document":
         raise InputError(path, "is no CZML", "its first packet must have the id document")
     uris = []
     for packet in packets[1:]:
@@ -194,7 +199,7 @@ def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
     """Files beside `path`, from addresses in it. Those with their data in them need none."""
     found = []
     for uri in uris:
-        parts = urlsplit(uri)
+        parts = _split(uri)
         if parts.scheme == "data":
             continue
         if parts.scheme or parts.netloc:
@@ -203,6 +208,11 @@ def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
         _check_there(path.parent / relative, path)
         found.append(relative)
     return tuple(found)
+
+
+def _split(uri: str) -> SplitResult:
+    with decoding("no address", ValueError):
+        return urlsplit(uri)
 
 
 def _check_there(target: Path, by: Path) -> None:

@@ -20,7 +20,7 @@ from exporters.asset import ByteArray, Texture, TexturedMesh
 from exporters.colour import srgb_from_linear
 from exporters.errors import ExportError
 from exporters.solid import merged_by_position, solid_of, unit_normals
-from exporters.triangle_files import check_triangle_file
+from exporters.triangles.files import check_triangle_file
 from fig2mesh.mesh.preview import render_mesh, view_bounds
 
 BoolArray = NDArray[np.bool_]

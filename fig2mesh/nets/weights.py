@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from exporters.atomic_file import atomic_path
 from fig2mesh.errors import InputError
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 S = TypeVar("S")
@@ -55,7 +56,7 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
             if not isinstance(facts, dict):
                 raise ValueError("facts")
             state = {name: stream.get_tensor(name) for name in stream.keys()}  # noqa: SIM118 - no mapping
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (SafetensorError, DamagedFile, OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(path, f"no readable weights ({type(error).__name__})", REINSTALL) from None
     broken = [name for name, value in state.items() if not torch.isfinite(value).all()]
     if broken:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageOps, UnidentifiedImageError
+from PIL import Image, ImageOps
 
-from exporters.texture_files import check_scans
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, size_of
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import PART_NAMES
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.image_file import NoPicture, TooLarge, check_scans, open_head, pillow
 
 OPAQUE = np.array([0, 0, 0, 255], np.uint8)
 
@@ -61,34 +61,28 @@ def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> View:
 
 def _open(path: Path, what: str) -> Image.Image:
     """Open and decode a picture, or say in one line why not."""
+    intact = f"give an intact picture as {what}"
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for, a device never end
             raise FigureError(path, "cannot be read (no plain file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
-        with warnings.catch_warnings():
-            # The limit below is ours and explicit; Pillow's warning would only repeat it.
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            image = Image.open(path, formats=FORMATS)
-            if image.width * image.height > MAX_PIXELS:
-                found = f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx"
-                raise FigureError(path, found, "pass --bbox X0 Y0 X1 Y1 round the figure")
-            check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
+        image = open_head(path, FORMATS)
+        if image.width * image.height > MAX_PIXELS:
+            raise TooLarge(f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx")
+        check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
+        with pillow():
             image.load()
             ImageOps.exif_transpose(image, in_place=True)
-            return image
-    except FigureError:
-        raise
-    except Image.DecompressionBombError:
-        raise FigureError(
-            path, f"more than {MAX_PIXELS / 1e6:.0f} Mpx", "pass --bbox X0 Y0 X1 Y1 round the figure"
-        ) from None
-    except UnidentifiedImageError:
+        return image
+    except TooLarge as error:
+        raise FigureError(path, str(error), "pass --bbox X0 Y0 X1 Y1 round the figure") from None
+    except NoPicture:
         raise FigureError(path, "not a picture that can be read", f"give a PNG, JPEG, TIFF or WebP as {what}") from None
+    except DamagedFile as error:
+        raise FigureError(path, f"cannot be read ({error})", intact) from None
     except FileNotFoundError:
         raise FigureError(path, "no such file", f"check the path of the {what}") from None
-    except Exception as error:
-        # Decoders raise whatever their format's parser raises; each of these means that the file is damaged.
-        reason = getattr(error, "strerror", None) or str(error).split("\n")[0][:100] or type(error).__name__
-        raise FigureError(path, f"cannot be read ({reason})", f"give an intact picture as {what}") from None
+    except OSError as error:
+        raise FigureError(path, f"cannot be read ({error.strerror})", intact) from None
 
 
 def read_rgba(path: Path) -> ByteArray:
@@ -96,7 +90,7 @@ def read_rgba(path: Path) -> ByteArray:
     image = _open(path, "figure")
     try:
         return _rgba(image)
-    except (ValueError, OSError) as error:  # a pixel that names no colour of its palette
+    except DamagedFile as error:  # a pixel that names no colour of its palette
         raise FigureError(path, f"cannot be read ({error})", "give an intact picture as figure") from None
 
 
@@ -117,7 +111,9 @@ def _rgba(image: Image.Image) -> ByteArray:
             grey = steps[values] if short else np.clip(values * factor, 0, 255).astype(np.uint8)
             rgba[top:bottom] = grey[..., None] | OPAQUE
         else:
-            rgba[top:bottom] = np.asarray(image.crop((0, top, width, bottom)).convert("RGBA"))
+            with pillow():
+                band = image.crop((0, top, width, bottom)).convert("RGBA")
+            rgba[top:bottom] = np.asarray(band)
     return rgba
 
 

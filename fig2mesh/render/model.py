@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
-from exporters.errors import DAMAGE, ExportError
-from exporters.gltf.reader import MESHOPT, Gltf, read_gltf
-from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
+from exporters.errors import ExportError
+from exporters.gltf.reader import Gltf, read_gltf
+from exporters.gltf.shape import MESHOPT
 from fig2mesh.measure.model import load_textured
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.image_file import check_head
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
 """Files that are models; everything else is taken for a drawing."""
@@ -33,34 +35,29 @@ def read_model(path: Path) -> TexturedMesh:
         _check_costs(gltf)
         mesh = load_textured(path)
         labels = _gltf_labels(gltf)
-    except DAMAGE as error:
-        if isinstance(error, ExportError):
-            raise
-        reason = " ".join(str(error).split())[:120]
-        raise ExportError(path, f"broken glTF ({type(error).__name__}: {reason})", "see fig2mesh validate") from error
+    except DamagedFile as error:
+        raise ExportError(path, f"broken glTF ({error})", "see fig2mesh validate") from error
     return replace(mesh, parts=labels) if labels is not None and len(labels) == len(mesh.vertices) else mesh
 
 
 def _check_costs(gltf: Gltf) -> None:
-    """Raise ValueError for what trimesh would take on trust: counts, trees of nodes, files beside, their pixels."""
+    """Raise DamagedFile for what trimesh would take on trust: counts, trees of nodes, files beside, their pixels."""
     gltf.instances()
     for index in range(len(gltf.items("accessors"))):
         gltf.accessor(index)
     for index in range(len(gltf.items("images"))):
-        data = gltf.image(index)
-        with opened(data) as image:
-            if image.width * image.height > MAX_TEXTURE_PX:
-                raise ValueError(f"image {index} has {image.width} x {image.height} px")
-            check_scans(image, data)
+        check_head(gltf.image(index))
 
 
 def _gltf_labels(gltf: Gltf) -> NDArray[np.uint8] | None:
     """(V,) part label of each vertex, as `exporters.gltf.glb` writes them; None in files without."""
-    tables = gltf.document.get("extensions", {}).get("EXT_structural_metadata", {}).get("propertyTables", [])
-    attributes = gltf.items("meshes")[0]["primitives"][0]["attributes"]
+    attributes: dict[str, int] = next((primitive["attributes"] for primitive in gltf.primitives(0)), {})
     if "_PART" in attributes:
         return gltf.accessor(attributes["_PART"]).astype(np.uint8)
-    if "_FEATURE_ID_0" not in attributes or not tables or "label" not in tables[0].get("properties", {}):
+    label = gltf.tables[0].get("properties", {}).get("label") if gltf.tables else None
+    if "_FEATURE_ID_0" not in attributes or label is None:
         return None
-    table = np.frombuffer(gltf.view(tables[0]["properties"]["label"]["values"]), np.uint8)
-    return table[gltf.accessor(attributes["_FEATURE_ID_0"]).astype(np.int64)]
+    table, ids = gltf.column(label["values"], "u1"), gltf.accessor(attributes["_FEATURE_ID_0"])
+    if not ((ids >= 0) & (ids < len(table))).all():
+        raise DamagedFile(f"feature ids outside 0..{len(table) - 1}")
+    return table[ids.astype(np.int64)]

@@ -14,6 +14,7 @@ from typing import Any
 
 from georef.errors import PlacementError
 from georef.sheets.controls import MAX_POINTS, Controls, make_controls, read_text
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 GEOREFERENCING = "georeferencing"
@@ -69,9 +70,7 @@ def read_annotation(path: Path) -> Controls:
 def _parsed(path: Path) -> Any:
     try:
         return parse_json(read_text(path))
-    except PlacementError:
-        raise
-    except ValueError as error:
+    except DamagedFile as error:
         raise PlacementError(path, str(error), "give a IIIF Georeference annotation") from None
 
 

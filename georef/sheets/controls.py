@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from georef.errors import PlacementError
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import read_bytes
 
 FloatArray = NDArray[np.float64]
@@ -105,7 +106,7 @@ def read_text(path: Path) -> str:
         content = read_bytes(path, MAX_BYTES)
     except FileNotFoundError:
         raise PlacementError(path, "no such file", "check the path") from None
-    except ValueError as error:
+    except DamagedFile as error:
         raise PlacementError(path, str(error), f"give a list of at most {MAX_POINTS} control points") from None
     except OSError as error:
         raise PlacementError(path, error.strerror or "cannot be read", "check the path") from None

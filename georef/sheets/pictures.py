@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from georef.errors import PlacementError
 from georef.sheets.controls import MAX_POINTS, Affine, Controls, make_controls
+from georef.untrusted.damage import DamagedFile, decoding
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".jp2", ".gif", ".bmp")
 
@@ -81,7 +83,7 @@ def read_picture(path: Path) -> Picture:
         return Picture(size)
     try:
         return _georeferenced(path, size, tags)
-    except (TypeError, ValueError, IndexError, KeyError):
+    except DamagedFile:
         raise PlacementError(path, "its GeoTIFF tags are damaged", "give an intact GeoTIFF, or a world file") from None
 
 
@@ -106,13 +108,19 @@ def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> P
     crs = _crs(keys)
     # Where the raster type is "point", raster coordinates count from the centre of the first pixel.
     shift = 0.5 if keys.get(RASTER_TYPE) == POINT else 0.0
-    tiepoints = np.array(tags.get(TIEPOINTS, ()), np.float64).reshape(-1, 6)
+    tiepoints = np.array(_numbers(tags, TIEPOINTS, 6), np.float64).reshape(-1, 6)
     if len(tiepoints) > MAX_POINTS:
         raise PlacementError(path, f"{len(tiepoints)} control points", f"give at most {MAX_POINTS}")
     if TRANSFORMATION in tags:
-        matrix = np.array(tags[TRANSFORMATION], np.float64).reshape(4, 4)[:2][:, [0, 1, 3]]
+        numbers = _numbers(tags, TRANSFORMATION, 16)
+        if len(numbers) != 16:
+            raise DamagedFile(f"a transformation of {len(numbers)} numbers")
+        matrix = np.array(numbers, np.float64).reshape(4, 4)[:2][:, [0, 1, 3]]
     elif PIXEL_SCALE in tags and len(tiepoints) == 1:
-        scale_x, scale_y = (float(v) for v in tags[PIXEL_SCALE][:2])
+        scales = _numbers(tags, PIXEL_SCALE)
+        if len(scales) < 2:
+            raise DamagedFile(f"a pixel scale of {len(scales)} numbers")
+        scale_x, scale_y = scales[:2]
         column, row, _, x, y, _ = tiepoints[0]
         matrix = np.array([[scale_x, 0.0, x - scale_x * column], [0.0, -scale_y, y + scale_y * row]])
     elif len(tiepoints) > 1:
@@ -126,10 +134,21 @@ def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> P
     return Picture(size, Affine(matrix, crs), crs)
 
 
+def _numbers(tags: dict[int, Any], tag: int, group: int = 1) -> list[float]:
+    """The numbers of a tag, none where it is missing. Raises DamagedFile for others than whole groups of numbers."""
+    values = tags.get(tag, ())
+    if not isinstance(values, tuple) or not all(isinstance(value, Real) for value in values) or len(values) % group:
+        raise DamagedFile(f"tag {tag} holds other things than numbers")
+    return [float(value) for value in values]
+
+
 def _geo_keys(tags: dict[int, Any]) -> dict[int, Any]:
-    directory = [int(value) for value in tags.get(GEO_KEYS, ())]
+    with decoding("a directory of keys", ValueError, OverflowError):  # not a number, or infinite
+        directory = [int(value) for value in _numbers(tags, GEO_KEYS)]
     keys: dict[int, Any] = {}
     for start in range(4, min(len(directory), 4 + 4 * (directory[3] if len(directory) > 3 else 0)), 4):
+        if start + 4 > len(directory):
+            raise DamagedFile("a directory of keys that is cut off")
         key, location, count, value = directory[start : start + 4]
         if location == 0:
             keys[key] = value

@@ -13,6 +13,7 @@ import numpy as np
 
 from georef.errors import PlacementError
 from georef.sheets.controls import FloatArray
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 if TYPE_CHECKING:
@@ -60,11 +61,11 @@ def crs_of(text: str, source: object = OPTION) -> CRS:
     shown = " ".join(text[:200].split())[:60]
     try:
         if len(text) > MAX_TEXT:
-            raise ValueError("too long")
+            raise DamagedFile("too long")
         if text.lstrip().startswith("{"):
             parse_json(text)
         crs = CRS.from_user_input(text.strip())
-    except (CRSError, RecursionError, UnicodeError, ValueError):  # pyproj looks for JSON behind any brace
+    except (CRSError, DamagedFile, RecursionError, UnicodeError, ValueError):  # pyproj looks for JSON behind any brace
         raise PlacementError(source, f"{shown!r} is no reference system", "give a code such as EPSG:2056") from None
     if crs.is_compound:
         crs = crs.sub_crs_list[0]

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from georef.errors import InputError
+from georef.untrusted.damage import DamagedFile
 
 MAX_DEPTH = 200
 """Levels of arrays and objects. Tilesets and scenes have tens; what walks a document by recursion stands 1000."""
@@ -39,25 +40,25 @@ _STEPS[list(b"]}")] = -1
 def parse_json(data: bytes | bytearray | memoryview | str) -> Any:
     """The document in a JSON text, UTF-8, or UTF-16 or 32 as told by its first bytes; a byte order mark is skipped.
 
-    Raises ValueError with one line for everything that the module's first line rules out, and for what is no JSON.
+    Raises DamagedFile with one line for everything that the module's first line rules out, and for what is no JSON.
     """
     text = data if isinstance(data, str) else _decoded(bytes(data))
     text = text.removeprefix("\ufeff")
     if _too_deep(text):
-        raise ValueError(f"nested too deeply: more than {MAX_DEPTH} levels")
+        raise DamagedFile(f"nested too deeply: more than {MAX_DEPTH} levels")
     try:
         document = json.loads(
             text, object_pairs_hook=_object, parse_int=_whole, parse_float=_number, parse_constant=_constant
         )
     except json.JSONDecodeError as error:
-        raise ValueError(f"not JSON: {error.msg} at line {error.lineno}, column {error.colno}") from None
+        raise DamagedFile(f"not JSON: {error.msg} at line {error.lineno}, column {error.colno}") from None
     except RecursionError:
-        raise ValueError("nested too deeply") from None
+        raise DamagedFile("nested too deeply") from None
     if re.search(r"\\u[dD][89a-fA-F]", text):
         try:
             json.dumps(document, ensure_ascii=False).encode()
         except UnicodeEncodeError:
-            raise ValueError("a text with half of a surrogate pair") from None
+            raise DamagedFile("a text with half of a surrogate pair") from None
     return document
 
 
@@ -70,7 +71,7 @@ def read_json(path: Path, remedy: str, error: type[InputError] = InputError, max
         return parse_json(read_bytes(path, max_bytes))
     except OSError as problem:
         raise error(path, problem.strerror or "cannot be read", remedy) from None
-    except ValueError as problem:
+    except DamagedFile as problem:
         raise error(path, str(problem), remedy) from None
 
 
@@ -85,16 +86,19 @@ def is_there(path: Path) -> bool:
 def read_bytes(path: Path, max_bytes: int) -> bytes:
     """The bytes of a plain file of limited size.
 
-    Raises OSError where it cannot be read; ValueError for larger ones and for what is no file but a device, a pipe or
+    Raises OSError where it cannot be read; DamagedFile for larger ones and for what is no file but a device, a pipe or
     a folder, which may never end.
     """
-    found = path.stat()
+    try:
+        found = path.stat()
+    except ValueError:  # a zero byte, or half of a surrogate pair
+        raise DamagedFile("no name of a file") from None
     if stat.S_ISDIR(found.st_mode):
-        raise ValueError("a folder, not a file")
+        raise DamagedFile("a folder, not a file")
     if not stat.S_ISREG(found.st_mode):
-        raise ValueError("no plain file")
+        raise DamagedFile("no plain file")
     if found.st_size > max_bytes:
-        raise ValueError(f"{found.st_size / 1e6:.0f} MB are more than the {max_bytes / 1e6:.0f} MB that are read")
+        raise DamagedFile(f"{found.st_size / 1e6:.0f} MB are more than the {max_bytes / 1e6:.0f} MB that are read")
     with path.open("rb") as stream:
         # Not `max_bytes`, which would be allocated before anything is read.
         return stream.read(found.st_size + 1)
@@ -105,7 +109,7 @@ def _decoded(data: bytes) -> str:
     try:
         return data.decode("utf-8" if coding == "utf-8-sig" else coding)
     except UnicodeDecodeError as error:
-        raise ValueError(f"no {coding.upper()} text: {error.reason} at byte {error.start}") from None
+        raise DamagedFile(f"no {coding.upper()} text: {error.reason} at byte {error.start}") from None
 
 
 def _too_deep(text: str) -> bool:
@@ -133,23 +137,23 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
             if key in seen:
                 break
             seen.add(key)
-        raise ValueError(f"the key {key[:40]!r} twice in one object")
+        raise DamagedFile(f"the key {key[:40]!r} twice in one object")
     return found
 
 
 def _whole(digits: str) -> int:
     value = int(digits) if len(digits) <= 21 else MAX_WHOLE + 1
     if abs(value) > MAX_WHOLE:
-        raise ValueError(f"the whole number {digits[:24]}… is larger than 2^64")
+        raise DamagedFile(f"the whole number {digits[:24]}… is larger than 2^64")
     return value
 
 
 def _number(digits: str) -> float:
     value = float(digits)
     if not math.isfinite(value):
-        raise ValueError(f"the number {digits[:24]} is larger than any float64")
+        raise DamagedFile(f"the number {digits[:24]} is larger than any float64")
     return value
 
 
 def _constant(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+    raise DamagedFile(f"{name} is no number of JSON")

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from exporters.georeference import georeference, placement_of_record
 from georef.placement import GeoPlacement
+from georef.untrusted.damage import DamagedFile
 
 PLACEMENTS = st.builds(
     GeoPlacement,
@@ -33,5 +34,5 @@ def test_round_trip_through_json(placement: GeoPlacement) -> None:
 )
 def test_a_record_of_another_kind_is_refused(change: dict[str, object]) -> None:
     record = georeference(GeoPlacement(8.5, 47.4)) | change
-    with pytest.raises(ValueError, match="georeference"):
+    with pytest.raises(DamagedFile, match="georeference"):
         placement_of_record(record)

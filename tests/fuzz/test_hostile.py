@@ -35,6 +35,7 @@ from georef.heights import undulation_m
 from georef.mapsheet import read_sheet
 from georef.sheets.pictures import read_picture
 from georef.sheets.reference import crs_of
+from georef.untrusted.damage import DamagedFile
 from tests.fuzz import seeds
 from tests.fuzz.readers import READERS
 from tests.fuzz.worker import outcome
@@ -160,7 +161,7 @@ def test_rows_that_overlap_and_nodes_with_two_parents(tmp_path: Path) -> None:
         "scenes": [{"nodes": [0]}],
     }
     path = glb(tmp_path / "a.glb", document, bytes(36))
-    with pytest.raises(ValueError, match="rows of 12 bytes every 1"):
+    with pytest.raises(DamagedFile, match="rows of 12 bytes every 1"):
         read_gltf(path).accessor(0)
     with pytest.raises(ExportError, match="two parents"):
         inspect(path)
@@ -234,7 +235,7 @@ def test_models_that_name_devices_pipes_and_other_peoples_files(tmp_path: Path) 
 def test_tables_of_batched_models_that_are_no_tables() -> None:
     for text in (b"[]      ", b"[NaN]   ", b"[" * 4096):
         data = struct.pack("<4s6I", b"b3dm", 1, 28 + len(text) + 4, len(text) + 4, 0, 0, 0) + text + b"    "
-        with pytest.raises(ValueError, match=r"object|NaN|JSON|nested"):
+        with pytest.raises(DamagedFile, match=r"object|NaN|JSON|nested"):
             read_b3dm(data)
 
 

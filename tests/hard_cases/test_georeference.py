@@ -17,6 +17,7 @@ from exporters.gltf.reader import read_gltf
 from exporters.tiles.tileset import write_tileset
 from fig2mesh.conversion.place import placement_of
 from fig2mesh.conversion.request import PlaceRequest
+from georef.errors import InputError
 from georef.geodesy import ecef_from_asset, ecef_from_geodetic, geodetic_from_ecef, tile_from_asset
 from georef.placement import GeoPlacement
 from tests.exporters.analytic import HEIGHT, asset
@@ -148,5 +149,5 @@ def test_places_that_are_hardly_there(lonlat: tuple[float, float], altitude: flo
         assert placed is not None
         assert (placed.lon_deg, placed.lat_deg, placed.height_m) == (*lonlat, altitude)
         return
-    with pytest.raises(ValueError, match=finding):
+    with pytest.raises(InputError, match=finding):
         placement_of(request)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from exporters.colour import srgb_from_linear
 from fig2mesh.errors import InputError
 from fig2mesh.skeleton import FIGURE_HEIGHT
-from fig2mesh.training.bodies.gltf_scene import GltfScene, read_gltf
+from fig2mesh.training.bodies.gltf_scene import GltfScene, read_scene
 
 # fmt: off
 BONES: dict[str, str] = {
@@ -65,7 +65,7 @@ class Soup(NamedTuple):
 # ---------------------------------------------------------------- reading
 def read_soup(path: Path) -> Soup:
     """Every skinned triangle of a character file in rest pose, scaled to `FIGURE_HEIGHT`, hat and hair included."""
-    scene = read_gltf(path)
+    scene = read_scene(path)
     names, parents, bone_of = _skeleton(scene, path)
     placed = scene.global_matrices()
     heads = placed[[scene.names.index(name) for name in names], :3, 3]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fig2mesh.errors import FigureError
 from fig2mesh.training.bodies.bullet_clips import motion_folder, read_motion
 from fig2mesh.training.bodies.bvh import Bvh, read_bvh
-from fig2mesh.training.bodies.gltf_scene import read_gltf
+from fig2mesh.training.bodies.gltf_scene import read_scene
 from fig2mesh.training.bodies.retarget import (
     LIMB_END,
     Rotations,
@@ -144,7 +144,7 @@ def collect_poses(assets: Path | None, *, count: int = 3000, seed: int = 0) -> t
 
 
 def _glb_clips(path: Path) -> Iterator[Clip]:
-    scene = read_gltf(path)
+    scene = read_scene(path)
     names = [name for name in scene.clips if not _SKIP.search(name)]
     bones = _match(scene.names)
     if bones is None or not names:

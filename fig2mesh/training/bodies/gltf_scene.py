@@ -1,13 +1,10 @@
-"""Just enough of glTF 2.0 binary to read rigs and clips: node tree, accessors, sampled animations.
+"""Rigs and clips in glTF files: the tree of nodes by name, and animations sampled at a moment.
 
-https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html ; morph targets, sparse accessors and external buffers are
-not read.
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#animations ; morph targets are not read.
 """
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,23 +13,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.errors import FigureError
+from exporters.gltf.reader import Gltf, local_matrix, read_gltf
 
-_COMPONENT = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-_WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _REST = {"translation": (0.0, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0), "scale": (1.0, 1.0, 1.0)}
 
 
 @dataclass(frozen=True)
 class GltfScene:
-    """One GLB file.
+    """A glTF file whose nodes move."""
 
-    document : the parsed JSON chunk
-    binary : the binary chunk
-    """
+    gltf: Gltf
 
-    document: dict[str, Any]
-    binary: bytes
+    @property
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        return self.gltf.document
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -66,16 +61,8 @@ class GltfScene:
 
     def accessor(self, index: int) -> NDArray[np.float64]:
         """(count, width) values of an accessor; normalised integers become -1 to 1."""
-        accessor = self.document["accessors"][index]
-        view = self.document["bufferViews"][accessor["bufferView"]]
-        width, dtype = _WIDTH[accessor["type"]], np.dtype(_COMPONENT[accessor["componentType"]]).newbyteorder("<")
-        step = view.get("byteStride") or width * dtype.itemsize
-        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        shape, strides = (accessor["count"], width), (step, dtype.itemsize)
-        values = np.ndarray(shape, dtype, self.binary, start, strides).astype(np.float64)
-        if accessor.get("normalized"):
-            values = np.maximum(values / (2 ** (8 * dtype.itemsize - (dtype.kind == "i")) - 1), -1)
-        return values
+        values = self.gltf.numbers(index).astype(np.float64)
+        return values.reshape(len(values), -1)
 
     def duration_s(self, clip: str) -> float:
         """Time of the last key of a clip."""
@@ -85,19 +72,14 @@ class GltfScene:
         """(N, 4, 4) node matrices in the scene's frame, at rest or at a fraction (0 to 1) of a clip."""
         nodes = self.document["nodes"]
         local = [{path: np.asarray(node.get(path, rest), float) for path, rest in _REST.items()} for node in nodes]
-        fixed = {index: node["matrix"] for index, node in enumerate(nodes) if "matrix" in node}
         if clip is not None:
             now = fraction * self.duration_s(clip)
             for node, path, times, values in self._tracks(clip):
                 local[node][path] = _sample(path, times, values, now)
         result = np.empty((len(nodes), 4, 4))
         for index in self.order:
-            if index in fixed:
-                matrix = np.asarray(fixed[index], float).reshape(4, 4).T
-            else:
-                matrix = np.eye(4)
-                matrix[:3, :3] = quaternion_matrix(local[index]["rotation"]) * local[index]["scale"]
-                matrix[:3, 3] = local[index]["translation"]
+            turned = local[index] | {"rotation": _unit(local[index]["rotation"])}
+            matrix = local_matrix(nodes[index] if "matrix" in nodes[index] else turned)
             parent = self.parents[index]
             result[index] = matrix if parent < 0 else result[parent] @ matrix
         return result
@@ -122,25 +104,13 @@ class GltfScene:
         return self._read_tracks[clip]
 
 
-def read_gltf(path: Path) -> GltfScene:
-    """Read one GLB file; raises `FigureError` where it is not one."""
-    data = path.read_bytes()
-    if len(data) < 20 or data[:4] != b"glTF" or data[16:20] != b"JSON":
-        raise FigureError(path.name, "it is no glTF 2.0 binary file", "export the scene as .glb")
-    length = struct.unpack("<I", data[12:16])[0]
-    return GltfScene(json.loads(data[20 : 20 + length]), data[28 + length :])
+def read_scene(path: Path) -> GltfScene:
+    """Read one glTF file. Raises ExportError where it is not one."""
+    return GltfScene(read_gltf(path))
 
 
-def quaternion_matrix(quaternion: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(3, 3) rotation of a quaternion x, y, z, w of any length but zero."""
-    x, y, z, w = np.asarray(quaternion, np.float64) / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+def _unit(quaternion: NDArray[np.floating]) -> NDArray[np.float64]:
+    return np.asarray(quaternion, np.float64) / np.linalg.norm(quaternion)
 
 
 def _sample(path: str, times: NDArray[np.float64], values: NDArray[np.float64], now: float) -> NDArray[np.float64]:

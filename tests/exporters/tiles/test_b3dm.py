@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from exporters.errors import ExportError
-from exporters.gltf.container import glb_of
 from exporters.gltf.glb import glb_bytes
+from exporters.gltf.reader import glb_of
 from exporters.tiles.b3dm import b3dm_bytes, read_b3dm
 from exporters.tiles.tileset import write_tileset
 from exporters.validate import validate

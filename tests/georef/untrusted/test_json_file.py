@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from georef.errors import MOST_CHARACTERS, InputError, PlacementError, one_line
+from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import MAX_DEPTH, parse_json, read_json
 
 VALUES = st.recursive(
@@ -35,7 +36,7 @@ def test_every_document_comes_back(value: Any, ascii_only: bool, coding: str) ->
 def test_brackets_in_texts_are_not_counted(text: str) -> None:
     deep = "[" * MAX_DEPTH + json.dumps(text) + "]" * MAX_DEPTH
     assert json.dumps(parse_json(deep)).replace(" ", "") == deep.replace(" ", "") or " " in text
-    with pytest.raises(ValueError, match="nested too deeply"):
+    with pytest.raises(DamagedFile, match="nested too deeply"):
         parse_json(f"[{deep}]")
 
 
@@ -44,7 +45,7 @@ def test_any_bytes_are_a_document_or_a_value_error_in_one_line(data: bytes) -> N
     said = ""
     try:
         parse_json(data)
-    except ValueError as error:
+    except DamagedFile as error:
         said = str(error)
     assert "\n" not in said
 
@@ -66,7 +67,7 @@ def test_any_bytes_are_a_document_or_a_value_error_in_one_line(data: bytes) -> N
     ],
 )
 def test_what_is_ruled_out(text: str | bytes, finding: str) -> None:
-    with pytest.raises(ValueError, match=finding):
+    with pytest.raises(DamagedFile, match=finding):
         parse_json(text)
 
 

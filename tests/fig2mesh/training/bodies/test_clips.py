@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exporters.errors import ExportError
+from exporters.gltf.reader import local_matrix
 from fig2mesh.errors import FigureError
 from fig2mesh.training.bodies import clips as clips_module
 from fig2mesh.training.bodies.bullet_clips import read_motion
 from fig2mesh.training.bodies.bvh import read_bvh
 from fig2mesh.training.bodies.clips import Clip, canonical_joints, collect_poses, farthest, held_out, read_clips
-from fig2mesh.training.bodies.gltf_scene import quaternion_matrix, read_gltf
+from fig2mesh.training.bodies.gltf_scene import read_scene
 from fig2mesh.training.bodies.retarget import (
     LIMB_END,
     TWIST_LIMIT_DEG,
@@ -83,6 +85,7 @@ def write_glb(path: Path, *, clip: str = "Armature|Turn") -> None:
             {"name": "root", "children": [2]},
             {"name": "middle", "translation": [1, 0, 0], "scale": [2, 2, 2], "children": [0]},
         ],
+        "buffers": [{"byteLength": len(binary)}],
         "bufferViews": [
             {"buffer": 0, "byteOffset": 0, "byteLength": 8},
             {"buffer": 0, "byteOffset": 8, "byteLength": 32},
@@ -158,7 +161,7 @@ def test_broken_bvh_is_named(tmp_path: Path, text: str) -> None:
 
 def test_gltf_tree_accessors_and_clip(tmp_path: Path) -> None:
     write_glb(tmp_path / "scene.glb")
-    scene = read_gltf(tmp_path / "scene.glb")
+    scene = read_scene(tmp_path / "scene.glb")
     assert scene.names == ("end", "root", "middle")
     assert scene.parents == (2, -1, 1)
     assert scene.order == (1, 2, 0)
@@ -173,14 +176,14 @@ def test_gltf_tree_accessors_and_clip(tmp_path: Path) -> None:
 
 def test_no_gltf_is_named(tmp_path: Path) -> None:
     (tmp_path / "x.glb").write_bytes(b"PK\x03\x04 a zip file, not a scene")
-    with pytest.raises(FigureError, match=r"x\.glb"):
-        read_gltf(tmp_path / "x.glb")
+    with pytest.raises(ExportError, match=r"x\.glb"):
+        read_scene(tmp_path / "x.glb")
 
 
 def test_quaternion_matrix_agrees_with_about() -> None:
     axis, angle = np.array([1.0, -2.0, 0.5]), 1.1
     quaternion = np.append(axis / np.linalg.norm(axis) * np.sin(angle / 2), np.cos(angle / 2))
-    assert np.allclose(quaternion_matrix(3 * quaternion), about(axis, angle))
+    assert np.allclose(local_matrix({"rotation": quaternion})[:3, :3], about(axis, angle))
 
 
 def test_limbs_point_as_in_the_clip(tmp_path: Path) -> None:

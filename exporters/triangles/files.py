@@ -1,4 +1,4 @@
-"""What PLY and OBJ files say before they are read by trimesh: their size, and the files that they name.
+"""PLY and OBJ files: what they say of their size and of further files, and their triangles as trimesh reads them.
 
 http://paulbourke.net/dataformats/obj/ and http://paulbourke.net/dataformats/mtl/
 """
@@ -8,9 +8,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from exporters.errors import ExportError
-from exporters.texture_files import MAX_TEXTURE_PX, check_scans, opened
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.image_file import check_head
 from georef.untrusted.json_file import is_there, read_bytes
 
 MAX_TRIANGLE_BYTES = 256 << 20
@@ -61,22 +65,15 @@ def check_triangle_file(path: Path) -> None:
         try:
             data = read_bytes(target, limit)
             if word == "map_Kd":
-                _check_picture(data)
-        except (OSError, ValueError) as error:
+                check_head(data)
+        except (OSError, DamagedFile) as error:
             raise ExportError(file, f"{word} {name[:80]}: {error}", "give the model with its own files") from None
-
-
-def _check_picture(data: bytes) -> None:
-    with opened(data) as image:
-        if image.width * image.height > MAX_TEXTURE_PX:
-            raise ValueError(f"{image.width} x {image.height} px are too many")
-        check_scans(image, data)
 
 
 def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
     try:
         data = read_bytes(file, limit)
-    except (OSError, ValueError) as error:
+    except (OSError, DamagedFile) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise ExportError(file, reason, "give the model with its own files") from None
     known = set()
@@ -88,3 +85,22 @@ def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
         if word == keyword and name not in known and "\0" not in name:
             known.add(name)
             yield file, word, name, file.parent / name
+
+
+def read_triangles(path: Path) -> Any:
+    """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
+    import trimesh
+
+    check_triangle_file(path)
+    try:
+        mesh = trimesh.load_mesh(str(path), process=False)
+    except Exception as error:  # trimesh lets whatever its parsers meet through
+        raise ExportError(path, f"cannot be read ({error})", "write it again") from error
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise ExportError(path, "holds no single triangle mesh", "write it again")
+    faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
+    if vertices.shape[1:] != (3,):
+        raise ExportError(path, "has vertices of other than 3 coordinates", "write it again")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ExportError(path, "has triangles of vertices that are not there", "write it again")
+    return mesh

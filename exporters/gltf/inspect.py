@@ -1,0 +1,74 @@
+"""What is in a glTF file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from exporters.errors import ExportError
+from exporters.facts import file_sizes, solid_facts
+from exporters.gltf.reader import Gltf, read_gltf
+from exporters.texture_files import texture_size
+from georef.untrusted.damage import DamagedFile
+
+
+def gltf_facts(path: Path) -> dict[str, Any]:
+    """Facts about a .glb or .gltf file; see `exporters.inspect.inspect`."""
+    gltf = read_gltf(path)
+    try:
+        return _facts(gltf)
+    except DamagedFile as error:
+        raise ExportError(path, f"broken glTF ({error})", "see validate") from error
+
+
+def _facts(gltf: Gltf) -> dict[str, Any]:
+    asset, extras, tables = gltf.document.get("asset", {}), gltf.extras, gltf.tables
+    meshes = range(len(gltf.items("meshes")))
+    solids = gltf.scene_solids()
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
+    vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
+    faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
+    uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
+    beside = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+    return {
+        "format": "glTF 2.0 binary" if gltf.path.suffix.lower() == ".glb" else "glTF 2.0",
+        "files": file_sizes(gltf.path, *beside),
+        "name": next((node["name"] for node in gltf.items("nodes") if "name" in node), None),
+        "copyright": asset.get("copyright"),
+        "generator": asset.get("generator"),
+        "vertices": sum(
+            len(gltf.mesh_arrays(mesh, primitive)[0])
+            for mesh in meshes
+            for primitive in range(len(gltf.primitives(mesh)))
+        ),
+        **solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
+        "texture_px": texture_size(gltf.image(0)) if gltf.items("images") else None,
+        "parts": _part_names(gltf, tables[0]) if tables else None,
+        "observed": _observed(gltf, tables[0]) if tables else None,
+        "placement": extras.get("georeference"),
+        "metadata": extras.get("metadata"),
+    }
+
+
+def _part_names(gltf: Gltf, table: dict[str, Any]) -> list[str]:
+    return gltf.texts(_column(table, "name"))
+
+
+def _observed(gltf: Gltf, table: dict[str, Any]) -> dict[str, float] | None:
+    """Share of each part that the drawing itself showed; None in files without."""
+    if "observedShare" not in table.get("properties", {}):
+        return None
+    names, shares = _part_names(gltf, table), gltf.column(_column(table, "observedShare")["values"], "<f4")
+    if len(names) != len(shares):
+        raise DamagedFile(f"{len(names)} names of parts, but {len(shares)} shares")
+    return {name: round(float(share), 3) for name, share in zip(names, shares, strict=True)}
+
+
+def _column(table: dict[str, Any], name: str) -> dict[str, Any]:
+    columns: dict[str, dict[str, Any]] = table.get("properties", {})
+    if name not in columns:
+        raise DamagedFile(f"its property table has no {name}")
+    return columns[name]

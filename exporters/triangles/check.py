@@ -1,0 +1,37 @@
+"""Checks of PLY and OBJ files: a closed solid, and references that are there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from exporters.errors import ExportError
+from exporters.findings import Finding, check_solid
+from exporters.solid import merged_by_position
+from exporters.triangles.files import read_triangles, references_of
+from georef.untrusted.json_file import is_there
+
+
+def check_triangles(path: Path) -> list[Finding]:
+    """Findings about a .ply or .obj file."""
+    try:
+        mesh = read_triangles(path)
+    except ExportError as error:
+        return [Finding("error", "UNREADABLE", error.finding, path.name)]
+    vertices = np.asarray(mesh.vertices)
+    if not np.isfinite(vertices).all():
+        return [Finding("error", "NOT_FINITE", "vertices are NaN or infinite", path.name)]
+    findings = []
+    if path.suffix.lower() == ".obj":
+        findings = _check_references(path)
+    return findings + check_solid(*merged_by_position(vertices, np.asarray(mesh.faces)), path.name)
+
+
+def _check_references(path: Path) -> list[Finding]:
+    """Files that an OBJ and its material libraries name but that are not there."""
+    return [
+        Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
+        for file, word, name, target in references_of(path)
+        if not is_there(target)
+    ]
