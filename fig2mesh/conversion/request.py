@@ -5,7 +5,7 @@ The options of the command line and the columns of collections are read from the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -208,7 +208,7 @@ class OutputOptions:
     overwrite: bool = option(default=False, column=False, help="Replace existing outputs.")
 
 
-@dataclass(frozen=True)
+@request_class
 class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOptions):
     """One figure from its files to its outputs. Raises InputError for values that no conversion can have."""
 
