@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import click
 
 from fig2mesh.conversion.libraries import PACKAGES, version
-from fig2mesh.mesh.close_pymeshlab import SYSTEM_LIBRARIES
+from fig2mesh.errors import SYSTEM_LIBRARIES
 
 
 @click.command()

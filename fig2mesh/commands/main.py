@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import sys
+import warnings
 from collections.abc import Sequence
 
 import click
@@ -120,6 +121,8 @@ def main(arguments: list[str] | None = None) -> int:
     from georef.errors import InputError
 
     words = sys.argv[1:] if arguments is None else arguments
+    # Pillow warns of damaged tags, in two lines with a path of its own; what matters our readers say themselves.
+    warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     try:
         result = cli.main(words, prog_name="fig2mesh", standalone_mode=False)
         return result if isinstance(result, int) else 0

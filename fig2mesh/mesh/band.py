@@ -65,7 +65,8 @@ def _slope(grid: Grid, cells: NDArray[np.int64]) -> FloatArray:
         (np.abs(np.diff(values, axis=axis)) * known.min(axis=axis, keepdims=True)).max(axis=(0, 1, 2))
         for axis in range(3)
     ]
-    slope: FloatArray = np.linalg.norm(steepest, axis=0) / np.float32(grid.spacing)
+    with np.errstate(over="ignore"):  # the norm of huge values is infinite, and so is the band
+        slope: FloatArray = np.linalg.norm(steepest, axis=0) / np.float32(grid.spacing)
     return slope
 
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fig2mesh.errors import InputError
+from fig2mesh.errors import SYSTEM_LIBRARIES, InputError
 from fig2mesh.mesh.topology import as_mesh
 from fig2mesh.records import Mesh
-
-SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 libopengl0 libusb-1.0-0"
-"""Brings the system libraries that Open3D and MeshLab load."""
 
 LARGEST_HOLE = 2000
 """Edges of the largest hole to close."""

@@ -277,7 +277,7 @@ def test_arrays_whose_heads_lie(tmp_path: Path, member: bytes, finding: str) -> 
 
 def test_a_stage_of_another_kind_and_records_whose_fields_do_not_fit(tmp_path: Path) -> None:
     FolderStore(tmp_path).write_file("lift", Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)))
-    with pytest.raises(FigureError, match="it holds a Mesh"):
+    with pytest.raises(FigureError, match="a record of kind Mesh"):
         FolderStore(tmp_path).read_file("lift", Pose3D)
     assert fits((1, 2.5), tuple[int, float])
     assert not fits((True, 2.5), tuple[int, float])
