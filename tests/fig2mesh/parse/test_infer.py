@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fig2mesh.parse.infer import infer_figure, look, on_light, spread, square
+from fig2mesh.parse.infer import infer_figure, on_light, predict, spread, square
 from fig2mesh.parse.picture import read_rgba
 from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
 from fig2mesh.training.evaluate.parser import GROUNDS, bare, drawings, evaluate_parse, measure
@@ -33,14 +33,14 @@ def test_the_farmer_is_found_on_any_ground(ground: str, least: float) -> None:
 def test_a_mirrored_picture_has_the_mirrored_answer(farmer: np.ndarray) -> None:
     size = farmer.shape[1], farmer.shape[0]
     centre, edge = np.array(size) / 2, 1.1 * max(size)
-    seen, turned = look(farmer, centre, edge), look(farmer[:, ::-1], [size[0] - centre[0], centre[1]], edge)
+    seen, turned = predict(farmer, centre, edge), predict(farmer[:, ::-1], [size[0] - centre[0], centre[1]], edge)
     # Resampling rounds to whole colours.
     assert np.abs(turned.likely[:, ::-1] - seen.likely).mean() < 0.002
     assert np.abs(turned.heat[list(JOINT_MIRROR)][:, :, ::-1] - seen.heat).max() < 0.05
 
 
 def test_likelihoods_are_likelihoods(farmer: np.ndarray) -> None:
-    seen = look(farmer, np.array(farmer.shape[1::-1]) / 2, float(max(farmer.shape)))
+    seen = predict(farmer, np.array(farmer.shape[1::-1]) / 2, float(max(farmer.shape)))
     assert np.allclose(seen.heat.sum(axis=(1, 2)), 1, atol=1e-4)
     assert np.allclose(seen.labels.sum(axis=0), 1, atol=1e-4)
     assert 0 <= seen.likely.min() <= seen.likely.max() <= 1
@@ -89,7 +89,7 @@ def test_a_square_beyond_the_picture_is_filled_with_its_rim() -> None:
 
 def test_cells_spread_over_the_picture_where_they_were_seen() -> None:
     picture = np.zeros((60, 40, 3), np.uint8)
-    seen = look(picture, np.array([20.0, 30.0]), 64.0)
+    seen = predict(picture, np.array([20.0, 30.0]), 64.0)
     values = np.zeros((16, 16), np.float32)
     values[8:, 8:] = 1
     out = spread(values, seen, (60, 40))

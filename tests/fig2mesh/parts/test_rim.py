@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.canvas import Canvas, make_canvas, raster_distance
 from fig2mesh.parts.inflate import inflate
-from fig2mesh.parts.rim import LEAST_SLOPE, OVERLAP, RIM_BLUR, extended, rim_distance
+from fig2mesh.parts.rim import MIN_SLOPE, OVERLAP, RIM_BLUR, extended, rim_distance
 from tests.drawn import Sketch
 
 PITCH = 0.008
@@ -143,5 +143,5 @@ def test_the_thinnest_strokes_keep_a_least_slope() -> None:
     x = np.abs(np.arange(SIDE) - SIDE // 2) - 1.2
     distance = np.broadcast_to(x, (SIDE, SIDE)) * PITCH
     u = extended(distance, np.zeros((SIDE, SIDE)), PITCH)
-    assert u[SIDE // 2, SIDE // 2] == pytest.approx(LEAST_SLOPE * 1.2 * PITCH)
+    assert u[SIDE // 2, SIDE // 2] == pytest.approx(MIN_SLOPE * 1.2 * PITCH)
     assert (u[distance > 0] < 0).all()
