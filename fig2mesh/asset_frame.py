@@ -54,7 +54,7 @@ def foot_on_picture(figure: Figure) -> tuple[float, float]:
 
 
 def height_on_picture(figure: Figure) -> float:
-    """Length in the picture that the figure was cut from, pixels, of what is its height on the globe."""
+    """Height of a figure on the globe, in pixels of the picture that it was cut from."""
     return figure.step_px * FIGURE_HEIGHT / image_frame(figure).units_per_px
 
 

@@ -43,11 +43,11 @@ def band(grid: Grid) -> Band:
     near = _any_corner(grid.outside & grid.known & (np.abs(grid.values) < 0.9 * LIPSCHITZ * grid.spacing))
     cells = np.argwhere(crossing | (near & ~_any_corner(inside)))
     lowest = ndimage.minimum_filter(grid.values, size=5, mode="nearest")
-    least = np.zeros(len(cells), np.float32)
+    minimum = np.zeros(len(cells), np.float32)
     for corner in np.ndindex(2, 2, 2):
-        np.minimum(least, lowest[tuple((cells + corner).T)], out=least)
+        np.minimum(minimum, lowest[tuple((cells + corner).T)], out=minimum)
     # In lengths, where the field runs slower or faster than the distance.
-    depth = -least / np.maximum(_slope(grid, cells), 1e-3) / np.float32(grid.spacing)
+    depth = -minimum / np.maximum(_slope(grid, cells), 1e-3) / np.float32(grid.spacing)
     crossed = crossing[tuple(cells.T)]
     # Beside a thick body the other cells lie just outside of it, and its neighbours give all points that they could.
     useful = crossed | (depth < 0.9)

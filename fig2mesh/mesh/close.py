@@ -1,6 +1,6 @@
 """Closing of meshes from ball pivoting: always a closed, oriented manifold, and a report (paper §4.5).
 
-The field knows which side is out, so faces are turned by its gradient, those that still disagree are dropped, and the
+The field defines the outside, so faces are turned by its gradient, those that still disagree are dropped, and the
 holes filled; new faces may disagree again, so this repeats until all is clean, mostly once or twice.
 
 What did not work: pymeshfix closed everything and deleted 40 % of the body; trimesh.fill_holes left 132 open edges and

@@ -73,8 +73,8 @@ def sample_grid(field: Field, spacing: float) -> Grid:
         edge = np.moveaxis(values, axis, 0)
         edge[[0, -1]] = np.maximum(edge[[0, -1]], spacing / 2)
     # A node exactly on the surface would make triangles of no area; move it by an invisible amount.
-    least = np.float32(1e-3 * spacing)
-    values = np.where(np.abs(values) < least, np.where(values < 0, -least, least), values)
+    tiny = np.float32(1e-3 * spacing)
+    values = np.where(np.abs(values) < tiny, np.where(values < 0, -tiny, tiny), values)
     return Grid(values, known, _outside(values), low, spacing)
 
 

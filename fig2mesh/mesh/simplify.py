@@ -65,11 +65,11 @@ def _improved(mesh: Mesh) -> Mesh:
 
 def _budgets(areas: NDArray[np.float64], sizes: NDArray[Any], triangles: int) -> NDArray[np.int64]:
     """(C,) triangles of each component: its share by area, clamped to [64, its own number]."""
-    least = np.minimum(sizes, MIN_TRIANGLES)
-    budgets: NDArray[np.int64] = np.clip(np.floor(areas / areas.sum() * triangles), least, sizes).astype(np.int64)
+    minimum = np.minimum(sizes, MIN_TRIANGLES)
+    budgets: NDArray[np.int64] = np.clip(np.floor(areas / areas.sum() * triangles), minimum, sizes).astype(np.int64)
     for _ in range(8):
         excess = int(budgets.sum()) - triangles
-        room = budgets - least if excess > 0 else sizes - budgets
+        room = budgets - minimum if excess > 0 else sizes - budgets
         if excess == 0 or room.sum() == 0:
             break
         change = np.minimum(np.ceil(abs(excess) * room / room.sum()).astype(np.int64), room)

@@ -34,7 +34,7 @@ HEAD_RATIO = (0.7, 1.3)
 MAX_OFFSET = 0.12
 """Largest distance of the middle from the bone, FIGURE units."""
 
-DOUBT, BELIEF = 0.45, 0.7
+LOW_OVERLAP, HIGH_OVERLAP = 0.45, 0.7
 """Overlap of a network's part with the drawn one in the front view: up to the former its depth has no weight, from the
 latter on full weight."""
 
@@ -104,7 +104,7 @@ def measure_cross_section(
     reference: NDArray[np.float64],
     bone: NDArray[np.float64],
 ) -> CrossSection | None:
-    """Cross-section of a layer; None where the networks know none of its parts.
+    """Cross-section of a layer; None where the networks have none of its parts.
 
     labels : (H, W) uint8, the parts of the drawn layer, 0 outside
     fields : of its parts
@@ -122,7 +122,7 @@ def measure_cross_section(
             continue
         # The overlap with the drawing is the confidence in a network: a pictogram's head is no head.
         overlap = common.sum() / max(int((there | drawn).sum()), 1)
-        trust = float(np.clip((overlap - DOUBT) / (BELIEF - DOUBT), 0.0, 1.0))
+        trust = float(np.clip((overlap - LOW_OVERLAP) / (HIGH_OVERLAP - LOW_OVERLAP), 0.0, 1.0))
         half = np.where(common, np.nan_to_num(front - back) / 2, 0.0)
         middle = np.where(common, np.nan_to_num(front + back) / 2 - bone, 0.0)
         # Sums before quotients: near a rim both are small, and neither alone means much. A head is a ball, and what

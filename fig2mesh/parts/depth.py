@@ -51,7 +51,7 @@ def place_limb(
 
     Parameters
     ----------
-    top, bottom : (H, W) FIGURE z of what is already there, NaN where nothing is
+    top, bottom : (H, W) FIGURE z of the layers placed so far, NaN elsewhere
     behind : put the hidden bones of the limb behind instead of in front
     """
     nearest = np.round(canvas.pixels(limb.points)).astype(int)

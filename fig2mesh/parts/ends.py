@@ -1,7 +1,7 @@
 """Flat ends: the hem of a gown, the soles of feet that stand.
 
 An inflated outline is round at its rim. Where the rim is the end of a tube of cloth, or where a foot meets the ground,
-that would make a wedge of it. There the outline is inflated as if it went on downwards, and cut off flat.
+that would make a wedge of it. There the outline is inflated as if it continued downwards, and cut off flat.
 """
 
 from __future__ import annotations

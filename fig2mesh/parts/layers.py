@@ -125,16 +125,16 @@ class _Inflation:
         fields: tuple[PartSdf, ...],
     ) -> None:
         self.canvas, self.loads, self.flat, self.device, self.fields = canvas, loads, flat, device, fields
-        self.profiles: dict[str, CrossSection | None] = {}
+        self.cross_sections: dict[str, CrossSection | None] = {}
 
     def __call__(self, layer: Layer, bones: Bones) -> LayerSurface:
         canvas = self.canvas
-        if layer.name not in self.profiles:
+        if layer.name not in self.cross_sections:
             # The networks' parts lie where the joints are, also where the limb has been moved since.
-            self.profiles[layer.name] = self._cross_section(
+            self.cross_sections[layer.name] = self._cross_section(
                 layer, bones if layer.limb is None else Bones.of(layer.limb)
             )
-        cross_section = self.profiles[layer.name]
+        cross_section = self.cross_sections[layer.name]
         ends = flat_ends(canvas, layer.region, np.isin(layer.labels, self.flat))
         rim = rim_distance(canvas, layer.region, ends)
         u = self._raised(layer.region, layer.labels, bones, ends, rim)
@@ -186,7 +186,7 @@ class _Inflation:
         return np.asarray(np.where(rim < 0, u + weight * (np.maximum(u, smooth * share) - u), 0.0))
 
     def _cross_section(self, layer: Layer, bones: Bones) -> CrossSection | None:
-        """Cross-section of a layer by the networks; None where they know none of its parts."""
+        """Cross-section of a layer by the networks; None where they have none of its parts."""
         canvas = self.canvas
         own = [field for field in self.fields if (layer.labels == field.part).any()]
         if not own:

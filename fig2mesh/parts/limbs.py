@@ -134,7 +134,7 @@ def measure(limb: Limb, canvas: Canvas, rivals: NDArray[np.float64]) -> Limb:
     # A bone of no length has no direction; across any line will do.
     tangent = np.where(length > 1e-9, tangent / np.maximum(length, 1e-9), [0.0, 1.0])
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    most = STOUT * limb.usual
+    max_radius = STOUT * limb.usual
     reach = np.arange(0.0, REACH, canvas.pitch)
     ends = np.zeros((len(limb.points), 2), bool)
     width = np.zeros((len(limb.points), 2))
@@ -148,7 +148,7 @@ def measure(limb: Limb, canvas: Canvas, rivals: NDArray[np.float64]) -> Limb:
         width[:, side] = np.minimum(leaves, meets) * canvas.pitch
     # A side that is free is the limb's own contour unless it is far off: cloth. Between two free sides lies a limb,
     # however stout it is drawn.
-    usable = ends & ((width <= most[:, None]) | ends.all(axis=1, keepdims=True))
+    usable = ends & ((width <= max_radius[:, None]) | ends.all(axis=1, keepdims=True))
     count = usable.sum(axis=1)
     known = count > 0
     measured = np.where(known, (width * usable).sum(1) / np.maximum(count, 1), np.nan)

@@ -37,7 +37,7 @@ canvas parts overlap by more than that."""
 THIN = 0.75
 """Largest grid spacing relative to the half thickness of a part."""
 
-LEAST_NODES, MOST_NODES = 64, 192
+MIN_NODES, MAX_NODES = 64, 192
 """The paper's grids have 64 nodes per edge (§4.2); small parts have fingers and need them more than large ones."""
 
 
@@ -113,7 +113,7 @@ def _part_field(
     low = np.array([points[0, columns.min(), 0], points[rows.max(), 0, 1], (surface.z0[solid] - half).min()]) - pad
     high = np.array([points[0, columns.max(), 0], points[rows.min(), 0, 1], (surface.z0[solid] + half).max()]) + pad
     edge = float((high - low).max())
-    nodes = min(max(math.ceil(edge / voxel) + 1, LEAST_NODES), MOST_NODES)
+    nodes = min(max(math.ceil(edge / voxel) + 1, MIN_NODES), MAX_NODES)
     centre = (low + high) / 2.0
     with single_threaded():
         grid = _evaluate(canvas, surface, cut, centre, edge, nodes, device)

@@ -13,7 +13,7 @@ RIM_BLUR = 0.012
 """Smoothing of rims inside the silhouette, FIGURE units: the stairs of pixels would become teeth."""
 
 MIN_SLOPE = 0.03
-"""Least increase of the squared half thickness from the rim inwards, FIGURE units: it makes what is drawn thinner than
+"""Least increase of the squared half thickness from the rim inwards, FIGURE units: it makes strokes thinner than
 half of it (strands, fringes) deeper than wide, so that grids and meshes hold it."""
 
 OVERLAP = 0.008
@@ -34,7 +34,7 @@ def rim_distance(canvas: Canvas, region: NDArray[np.bool_], ends: Ends | None) -
         contour = np.pad(canvas.sdf, ((0, extra), (0, 0)), mode="edge")
         whole = raster_distance(inside) * canvas.pitch
         contour = np.where(np.abs(whole - contour) < 1.5 * canvas.pitch, contour, whole)
-    # Outside the silhouette the layer goes on, so that its smoothed rim does not touch the drawn one.
+    # Outside the silhouette the layer is continued, so that its smoothed rim does not touch the drawn one.
     _, nearest = ndimage.distance_transform_edt(~inside, return_indices=True)
     mine = region[tuple(nearest)]
     if mine.all():

@@ -138,7 +138,7 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         layers.append(Layer(limb.name, region, _as_given(computed, canvas, shown, limb.part), limb, shown))
         if limb.cloth:
             continue
-        # Behind a limb the core goes on: inside the torso, around the root joint, and where it is on both sides.
+        # Behind a limb the core continues: inside the torso, around the root joint, and where it is on both sides.
         root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
         behind = closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
         completed |= inside & region & ((torso < 0) | root | behind)

@@ -15,10 +15,10 @@ from fig2mesh.records import Figure, Pose3D
 from fig2mesh.skeleton import JOINT, LIMB_BONES
 
 FORESHORTENED = 0.8
-"""Limbs shorter than this share of their twin lean; nearer lengths are the draughtsman's liberty."""
+"""Threshold, share of the twin's length, below which a limb leans; larger ratios are the draughtsman's liberty."""
 
 DAMPING = 0.7
-"""Share of the geometric depth that is used: drawn proportions are no measurements."""
+"""Share of the geometric depth that is used: drawn proportions are not exact."""
 
 MAX_DEPTH_STEP = 0.30
 """Largest depth difference along one bone, FIGURE units."""

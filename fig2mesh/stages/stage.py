@@ -33,7 +33,7 @@ class Unless:
 class Stage:
     """Stage of the pipeline.
 
-    function : makes the result; see `fig2mesh.stages` for what its signature means
+    function : makes the result; its signature is explained in `fig2mesh.stages`
     why : description of the stage under given settings, shown by `fig2mesh plan` and in reports
     kept : whether stores keep the result
     unless : setting under which the stage is left out

@@ -65,8 +65,8 @@ def find_pen(
     rim = own & ~ndimage.binary_erosion(own)
     if near[rim].mean() < DRAWN:
         return None
-    most = inks[int(np.argmax([(index[strokes] == ink).sum() for ink in inks]))]
-    return Pen(palette[most], width, near)
+    commonest = inks[int(np.argmax([(index[strokes] == ink).sum() for ink in inks]))]
+    return Pen(palette[commonest], width, near)
 
 
 def without_contour(
@@ -81,7 +81,7 @@ def without_contour(
     # Where the line ends it is mixed with what is beside it.
     line = within & ndimage.binary_dilation(inky & within, iterations=max(1, round(width / 4)))
     away, source = ndimage.distance_transform_edt(line | ~own, return_indices=True)
-    # Clothes as dark as ink go on further in, and stay.
+    # Clothes as dark as ink continue further in, and are kept.
     line &= away <= 1.5 * BAND * width
     near = ndimage.distance_transform_edt(~line) <= BAND * width
     return np.where(((line | ~own) & near)[..., None], picture[tuple(source)], picture)

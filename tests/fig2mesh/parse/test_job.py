@@ -117,7 +117,7 @@ def test_refusals_are_one_line(
     Path("there/mask.png").write_bytes(b"")
     arguments, message = REFUSED[case]
     assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert len(said.strip().splitlines()) == 1
+    output = capsys.readouterr().err
+    assert message in output
+    assert len(output.strip().splitlines()) == 1
     assert not Path("new").exists()

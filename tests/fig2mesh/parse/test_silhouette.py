@@ -18,7 +18,7 @@ def disc(x: float, y: float, radius: float) -> np.ndarray:
 
 
 def guess(mask: np.ndarray, blurred: float = 7.0) -> np.ndarray:
-    """What a network on a coarse grid would say."""
+    """Prediction of a network on a coarse grid."""
     return ndimage.gaussian_filter(mask.astype(np.float32), blurred)
 
 

@@ -67,7 +67,7 @@ def test_columns_of_an_ellipsoid_are_as_long_as_its_formula_says() -> None:
 
 @pytest.mark.parametrize("thickness", [0.7, 1.0, 1.5])
 def test_ratio_is_the_square_of_relative_thickness_and_offset_the_shift(thickness: float) -> None:
-    """What counts is how thick the network's part is, in units of how thick the drawn outline is inflated."""
+    """The thickness of the network's part counts in units of the inflated outline's thickness."""
     disc = canvas()
     bone = np.full(disc.sdf.shape, 0.02)
     field = ellipsoid((RADIUS, RADIUS, thickness * RADIUS), (0, 0, 0.06))
@@ -109,7 +109,7 @@ def test_parts_that_do_not_explain_the_drawing_are_not_believed() -> None:
 
 
 def test_a_head_has_one_ratio_and_one_offset() -> None:
-    """What an outline has of nose and hat is not repeated in depth, and a head is not sheared."""
+    """Nose and hat of an outline are not repeated in depth, and a head is not sheared."""
     disc = canvas()
     field = ellipsoid((RADIUS, RADIUS, 0.18), (0, 0, 0.03))
     head = replace(field, part=2, grid=field.grid + np.float32(0.02) * np.sin(40 * np.arange(NODES)).astype(np.float32))

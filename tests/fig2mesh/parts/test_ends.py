@@ -41,7 +41,7 @@ def test_a_box_ends_at_its_bottom_edge() -> None:
     assert (ends.source[inner] == BOTTOM - 1).all()
     assert (ends.source[:LEFT] == -1).all()
     assert (ends.source[RIGHT:] == -1).all()
-    # Corners look sideways too; what they take from the end is no more than they are smoothed.
+    # Corners point sideways too; they shorten the end by no more than they are smoothed.
     assert (ends.source >= 0).sum() >= RIGHT - LEFT - 12
 
 

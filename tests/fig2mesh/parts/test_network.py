@@ -1,4 +1,4 @@
-"""What the part networks are asked, and what is done with what they answer."""
+"""Inputs of the part networks, and the use of their outputs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def disc(centre: tuple[float, float], radius: float) -> NDArray[np.bool_]:
 
 @pytest.fixture(scope="module")
 def sizes() -> dict[str, PartSizeNet]:
-    """Untrained networks: what they say is arbitrary."""
+    """Untrained networks: their output is arbitrary."""
     return {kind: PartSizeNet(SizeShape(kind)) for kind in KINDS}
 
 

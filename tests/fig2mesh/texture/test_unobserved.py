@@ -1,4 +1,4 @@
-"""Four sides of a body, and what networks change of where unseen points find their colours."""
+"""Four sides of a body, and the networks' changes of the locations from which hidden points take their colours."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_extras_count_as_what_they_cover() -> None:
     wanted = [PART[n] for n in ("torso", "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg")]
     assert body_labels(labels, points, Pose3D(joints)).tolist() == wanted
     turned = Pose3D(joints * np.array([-1, 1, 1], np.float32))
-    assert body_labels(labels, points, turned)[1] == PART["r_upper_leg"], "seen from behind"
+    assert body_labels(labels, points, turned)[1] == PART["r_upper_leg"], "from behind"
     others = np.array([PART["hair"], PART["prop"], 0, PART["l_hand"]], np.uint8)
     assert body_labels(others, points[:4], POSE).tolist() == [PART["head"], 0, 0, PART["l_hand"]]
 
