@@ -66,19 +66,19 @@ def trace_reference(body: Body, rays: Rays, *, tolerance: float = 1e-4, max_step
             continue
         corner = part.centre.astype(np.float64) - float(part.edge) / 2
         enter, leave = _slabs(np.clip(box + [[-1e-3], [1e-3]], 0, part.grid.shape[0] - 1) * part.spacing + corner, rays)
-        todo = np.flatnonzero((enter <= leave) & (enter < best))
+        active = np.flatnonzero((enter <= leave) & (enter < best))
         found, used = _march(
             part,
-            origins[todo],
-            directions[todo],
-            enter[todo],
-            np.minimum(leave, best)[todo],
+            origins[active],
+            directions[active],
+            enter[active],
+            np.minimum(leave, best)[active],
             tolerance,
             max_steps,
         )
-        steps[todo] += used
-        nearer = found < best[todo]
-        best[todo[nearer]], index[todo[nearer]] = found[nearer], number
+        steps[active] += used
+        nearer = found < best[active]
+        best[active[nearer]], index[active[nearer]] = found[nearer], number
     points, normals = np.zeros((count, 3)), np.zeros((count, 3))
     hit = index >= 0
     points[hit] = origins[hit] + best[hit, None] * directions[hit]
@@ -112,14 +112,14 @@ def _march(
     reach = 1 / max(lipschitz(part.grid, h, outside=True), 1e-30)
     corners = np.array(list(np.ndindex(2, 2, 2)))
     found, steps = np.full(len(t), np.inf), np.zeros(len(t), np.int32)
-    t, todo = t.copy(), np.arange(len(t))
+    t, active = t.copy(), np.arange(len(t))
     cell = np.clip(np.floor(start + t[:, None] * speed).astype(int), 0, n - 2)
     for _ in range(max_steps):
-        todo = todo[(t[todo] <= end[todo]) & ((cell[todo] >= 0) & (cell[todo] <= n - 2)).all(axis=1)]
-        if len(todo) == 0:
+        active = active[(t[active] <= end[active]) & ((cell[active] >= 0) & (cell[active] <= n - 2)).all(axis=1)]
+        if len(active) == 0:
             break
-        u, w, c, now = start[todo], speed[todo], cell[todo], t[todo]
-        steps[todo] += 1
+        u, w, c, now = start[active], speed[active], cell[active], t[active]
+        steps[active] += 1
         grid = part.grid[tuple((c[:, None] + corners).transpose(2, 0, 1))].astype(np.float64)  # (A, 8)
 
         def along(when: Array, u: Array = u, w: Array = w, c: Array = c, grid: Array = grid) -> Array:
@@ -138,15 +138,15 @@ def _march(
             middle = np.where(np.isfinite(high), 0.5 * (low + np.where(np.isfinite(high), high, 0)), low)
             positive = along(middle) > 0
             low, high = np.where(positive, middle, low), np.where(positive, high, middle)
-        hit = (value <= 0) | (~jumps & np.isfinite(high) & (low <= end[todo]))
-        found[todo[hit]] = np.where(value <= 0, now, low)[hit]
-        t[todo] = np.where(jumps, jump, leave)
+        hit = (value <= 0) | (~jumps & np.isfinite(high) & (low <= end[active]))
+        found[active[hit]] = np.where(value <= 0, now, low)[hit]
+        t[active] = np.where(jumps, jump, leave)
         step = np.zeros_like(c)
         step[np.arange(len(c)), exits.argmin(axis=1)] = 1
         stepped = c + step * np.where(w > 0, 1, -1)
         jumped = np.clip(np.floor(u + jump[:, None] * w), 0, n - 2).astype(int)
-        cell[todo] = np.where(jumps[:, None], jumped, stepped)
-        todo = todo[~hit]
+        cell[active] = np.where(jumps[:, None], jumped, stepped)
+        active = active[~hit]
     return found, steps
 
 

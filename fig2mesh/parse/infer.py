@@ -109,8 +109,8 @@ def on_light(rgb: ByteArray) -> ByteArray:
     colour = np.median(rim, axis=0)
     if colour.mean() > DARK_THRESHOLD or (np.abs(rim - colour).max(axis=1) <= RIM_TOLERANCE).mean() < PLAIN_RIM:
         return rgb
-    ground = (np.abs(rgb.astype(np.int16) - colour) <= RIM_TOLERANCE).all(axis=2)
-    regions, _ = ndimage.label(ground)
+    background = (np.abs(rgb.astype(np.int16) - colour) <= RIM_TOLERANCE).all(axis=2)
+    regions, _ = ndimage.label(background)
     ends = np.unique(np.concatenate([regions[0], regions[-1], regions[:, 0], regions[:, -1]]))
     outside = np.isin(regions, ends[ends > 0])
     return np.where(outside[..., None], np.uint8(255), rgb)

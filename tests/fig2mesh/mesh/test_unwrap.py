@@ -7,7 +7,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.mesh.bake import drawn_faces
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.topology import edge_pairs, face_areas
-from fig2mesh.mesh.unwrap import PATCH, Drawn, unwrap
+from fig2mesh.mesh.unwrap import MAX_PATCH, Drawn, unwrap
 from fig2mesh.records import Mesh, UvMesh
 
 from .solids import SOLIDS, closed
@@ -89,7 +89,7 @@ def test_the_texture_is_used() -> None:
 
 def test_a_mesh_of_several_patches() -> None:
     solid = isosurface(Body(mannequin(24)), spacing=0.02)
-    assert len(solid.faces) > PATCH
+    assert len(solid.faces) > MAX_PATCH
     mesh = unwrap(solid, texture_size=512)
     assert np.array_equal(mesh.solid_index[mesh.faces], solid.faces)
     assert (texel_areas(mesh) >= 0).all()
