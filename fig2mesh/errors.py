@@ -18,4 +18,4 @@ class FigureError(InputError):
 
 
 class OutputError(InputError):
-    """A result cannot be written where it was asked for."""
+    """A result cannot be written to the requested place."""

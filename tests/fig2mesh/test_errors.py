@@ -1,4 +1,4 @@
-"""What the kinds of errors say of themselves."""
+"""Attributes of the kinds of errors."""
 
 from __future__ import annotations
 

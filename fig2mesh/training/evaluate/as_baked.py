@@ -19,10 +19,10 @@ from fig2mesh.parts.split import split
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import Figure
 from fig2mesh.skeleton import JOINT
+from fig2mesh.texture.majority import UnobservedPoints
 from fig2mesh.texture.sources import Sources, make_sources
 from fig2mesh.texture.space import inwards
-from fig2mesh.texture.unseen import LEAST_PX
-from fig2mesh.texture.votes import Unseen
+from fig2mesh.texture.unobserved import MIN_INNER_PX
 from fig2mesh.training.samples.textured_subject import Subject
 
 CANVAS_PX: Final = 512
@@ -73,8 +73,8 @@ def _sources(subject: Subject, straight: NDArray[np.float64], found: NDArray[np.
     joints = lift(figure, frame).joints.astype(np.float64)
     divided = split(canvas, joints, visible)
     outline = Outline((), divided, raise_layers(canvas, divided, joints, "cpu"), canvas)
-    used = inwards(sides.labels > 0) > LEAST_PX
+    used = inwards(sides.labels > 0) > MIN_INNER_PX
     used[0] = False
     points, named = (frame.figure_from_image(pixels[used]).astype(np.float32) for pixels in (straight, found))
-    unseen = Unseen(sides.shown[used], points, named)
+    unseen = UnobservedPoints(sides.shown[used], points, named)
     return make_sources(figure, frame, outline, TEXTURE, 0, lambda picture: unseen)

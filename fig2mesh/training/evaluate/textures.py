@@ -21,7 +21,7 @@ from fig2mesh.nets.uv_unet import SHIPPED, UV_WEIGHTS, UvUnetShape
 from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape
 from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
-from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
+from fig2mesh.texture.unobserved import TextureNets, paint, place_changes, shipped, texture_coordinates
 from fig2mesh.training.evaluate.as_baked import baked_sides
 from fig2mesh.training.evaluate.networks import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.evaluate.paper import UV_SCORES
@@ -86,7 +86,7 @@ def painted(subject: Subject, road: str, nets: TextureNets) -> tuple[Picture, Pi
         return result, straight
     if road == INPAINTED:
         return _inpainted(subject, nets), straight
-    found = straight + unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    found = straight + place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
     if road == COORDINATES:
         return _sampled(front, found), found
     if road == BAKED:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.records import Pose3D
 from fig2mesh.skeleton import JOINT, PART
-from fig2mesh.texture.sides import Sides, body_labels
+from fig2mesh.texture.sides import SideViews, body_labels
 from fig2mesh.texture.space import inwards
 from fig2mesh.training.samples.build import read_shard, shards
 from fig2mesh.training.samples.texture_data import Drawings, load_drawings
@@ -31,14 +31,14 @@ FILLED: Final = 0.9
 class Subject:
     """One body of `Drawings` as if it were traced, and its front picture.
 
-    sides : see `Sides`; FIGURE x, y relative to the middle of the front
+    sides : see `SideViews`; FIGURE x, y relative to the middle of the front
     front : (H, W, 3) float32, 0-255, colours carried on beyond the silhouette
     truth : (4, H, W, 3) float32, 0-255
     face : (H, W) bool, where the front has eyes and mouth
     joints_px : (21, 2) float32, pixels of the front
     """
 
-    sides: Sides
+    sides: SideViews
     front: NDArray[np.float32]
     truth: NDArray[np.float32]
     face: NDArray[np.bool_]
@@ -86,7 +86,7 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
     face = _face(own, joints, joints_px, pitch)
     top = float(joints[:, 1].max())
     pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * FILLED], joints[:, 2:]], axis=1))
-    sides = Sides(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
+    sides = SideViews(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
     front = carried_on(picture[0], inwards(labels[0] > 0))
     return Subject(sides, front, picture, face, joints_px.astype(np.float32))
 

@@ -111,7 +111,7 @@ CASES = {
     "text": "not a picture",
     "truncated": "cannot be read",
     "folder": "cannot be read",
-    "blank": "no figure is found in it; pass --bbox",
+    "blank": "no figure found; pass --bbox",
     "mask size": "50×50 px, but the figure has 400×600",
     "empty mask": "silhouette is empty",
     "not json": "not JSON",

@@ -12,7 +12,7 @@ from fig2mesh.nets.head_hsv import HeadHsv, HeadShape
 from fig2mesh.nets.texture_fill import FillShape, TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
-from fig2mesh.texture.unseen import TextureNets
+from fig2mesh.texture.unobserved import TextureNets
 from fig2mesh.training.evaluate.textures import COORDINATES, PLACED, ROADS, STRAIGHT, compare, face_share, painted
 from fig2mesh.training.networks.loop import seeded
 from fig2mesh.training.samples.textured_subject import Subject, subjects
