@@ -11,7 +11,7 @@ from PIL import Image
 from fig2mesh.parse.infer import infer_figure, on_light, predict, spread, square
 from fig2mesh.parse.picture import read_rgba
 from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
-from fig2mesh.training.evaluate.parser import GROUNDS, bare, drawings, evaluate_parse, measure
+from fig2mesh.training.evaluate.parser import BACKGROUNDS, bare, drawings, evaluate_parse, measure
 
 FARMER = Path(__file__).parents[3] / "examples" / "figures" / "farmer"
 
@@ -105,4 +105,4 @@ def test_the_table_names_every_drawing(tmp_path: Path) -> None:
     text = evaluate_parse(tmp_path)
     assert "| one |" in text
     assert "| mean |" in text
-    assert all(f"| {ground} |" in text for ground in GROUNDS)
+    assert all(f"| {ground} |" in text for ground in BACKGROUNDS)
