@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from exporters.solid import measure_topology
-from georef.untrusted.json_file import is_there
+from georef.untrusted.json_file import is_plain_file
 
 
 def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
@@ -31,4 +31,4 @@ def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
 
 def file_sizes(*paths: Path) -> dict[str, int]:
     """Bytes of the files that are there, by name."""
-    return {path.name: path.stat().st_size for path in paths if is_there(path)}
+    return {path.name: path.stat().st_size for path in paths if is_plain_file(path)}

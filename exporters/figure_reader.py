@@ -20,7 +20,7 @@ from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monoto
 from exporters.tiles.b3dm import part_table
 from georef.geodesy import tile_from_asset
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.json_shape import NUMBER, Needed, Numbers, check_shape
+from georef.untrusted.json_shape import NUMBER, Numbers, Required, check_shape
 
 SAME_PLACE_M = 1e-3
 """A tile's transform and the place recorded in its content may differ by this much: the project's promise."""
@@ -175,7 +175,7 @@ def _figure_of_tiles(tile: dict[str, Any], path: Path) -> PlacedFigure:
         if not uri.lower().endswith(".glb") or len(children) > 1:
             found = f"content {uri!r} with {len(children)} finer tiles is no level of a figure"
             raise ExportError(path, found, "give the .glb files instead")
-        check_shape(below, {"geometricError": Needed(NUMBER)}, f"tile of {uri[:40]}")
+        check_shape(below, {"geometricError": Required(NUMBER)}, f"tile of {uri[:40]}")
         levels.append((path.parent / uri, float(below["geometricError"])))
         below = children[0] if children else None
     records = [read_figure(file) for file, _ in reversed(levels)]

@@ -13,12 +13,12 @@ from georef.geodesy import geodetic_from_ecef, nose_bearing_deg
 from georef.placement import GeoPlacement
 from georef.transform import Transform
 from georef.untrusted.damage import DamagedFile, decoding
-from georef.untrusted.json_shape import NUMBER, Needed, Numbers, check_shape
+from georef.untrusted.json_shape import NUMBER, Numbers, Required, check_shape
 
 RECORD = {
-    "crs": Needed(str),
-    "lon_deg": Needed(NUMBER),
-    "lat_deg": Needed(NUMBER),
+    "crs": Required(str),
+    "lon_deg": Required(NUMBER),
+    "lat_deg": Required(NUMBER),
     "height_m": NUMBER,
     "height_datum": str,
     "heading_deg": NUMBER,

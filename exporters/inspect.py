@@ -11,14 +11,14 @@ from exporters.gis.inspect import places_facts
 from exporters.gltf.inspect import gltf_facts
 from exporters.tiles.inspect import tileset_facts
 from exporters.triangles.inspect import triangle_facts
-from exporters.usd.process import usd_facts_apart
+from exporters.usd.process import usd_facts_isolated
 from georef.errors import PlacementError
 from georef.untrusted.damage import DamagedFile
 
 # fmt: off
 FACTS = {
-    ".glb": gltf_facts, ".gltf": gltf_facts, ".usda": usd_facts_apart, ".usdc": usd_facts_apart,
-    ".usdz": usd_facts_apart, ".ply": triangle_facts, ".obj": triangle_facts, ".czml": places_facts,
+    ".glb": gltf_facts, ".gltf": gltf_facts, ".usda": usd_facts_isolated, ".usdc": usd_facts_isolated,
+    ".usdz": usd_facts_isolated, ".ply": triangle_facts, ".obj": triangle_facts, ".czml": places_facts,
     ".geojson": places_facts, ".json": tileset_facts,
 }
 KEYS = (

@@ -62,7 +62,7 @@ class Topology:
     euler : vertices - edges + triangles
     genus : number of handles, all pieces together; None unless the surface is closed, oriented and manifold
     volume : enclosed volume in cubic units of the vertices, positive if faces are counter-clockwise from outside
-    least_volume : that of the piece with the smallest one; negative for cavities and pieces turned inside out
+    min_volume : that of the piece with the smallest one; negative for cavities and pieces turned inside out
     """
 
     vertices: int
@@ -76,7 +76,7 @@ class Topology:
     euler: int
     genus: int | None
     volume: float
-    least_volume: float
+    min_volume: float
 
     @property
     def closed(self) -> bool:
@@ -101,7 +101,7 @@ class Topology:
     @property
     def outward(self) -> bool:
         """A solid whose every piece has its inside inside: none is a cavity or turned inside out."""
-        return self.solid and self.least_volume > 0
+        return self.solid and self.min_volume > 0
 
 
 def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
@@ -157,7 +157,7 @@ def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
         euler=euler,
         genus=components - euler // 2 if clean else None,
         volume=volume,
-        least_volume=float(piece_volumes(triangles, piece).min()),
+        min_volume=float(piece_volumes(triangles, piece).min()),
     )
 
 

@@ -11,16 +11,16 @@ from exporters.gis.check import check_czml, check_geojson
 from exporters.gltf.check import check_gltf
 from exporters.tiles.check import check_tileset
 from exporters.triangles.check import check_triangles
-from exporters.usd.process import check_usd_apart
+from exporters.usd.process import check_usd_isolated
 from georef.errors import PlacementError
 from georef.untrusted.damage import DamagedFile
 
 __all__ = ["Finding", "validate"]
 
 CHECKS = {
-    ".usda": check_usd_apart,
-    ".usdc": check_usd_apart,
-    ".usdz": check_usd_apart,
+    ".usda": check_usd_isolated,
+    ".usdc": check_usd_isolated,
+    ".usdz": check_usd_isolated,
     ".ply": check_triangles,
     ".obj": check_triangles,
     ".czml": check_czml,

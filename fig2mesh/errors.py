@@ -10,7 +10,7 @@ __all__ = ["FigureError", "InputError", "OutputError"]
 class FigureError(InputError):
     """The picture, mask, joints or part labels of a figure cannot be used."""
 
-    lasting = True
+    permanent = True
 
 
 class OutputError(InputError):

@@ -24,7 +24,7 @@ from exporters.tiles.volumes import numbers
 from georef.geodesy import ecef_from_geodetic
 from georef.placement import GeoPlacement
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.json_file import is_there, read_json
+from georef.untrusted.json_file import is_plain_file, read_json
 from georef.untrusted.json_shape import check_shape
 
 # fmt: off
@@ -127,7 +127,7 @@ def _placement(uri: str, path: Path, where: str) -> tuple[GeoPlacement | None, l
     if uri.startswith(("http:", "https:", "data:", "//")):
         return None, [Finding("info", "NOT_CHECKED", f"model {uri[:60]} is elsewhere", where)]
     file = path.parent / unquote(uri)
-    if not is_there(file):
+    if not is_plain_file(file):
         return None, [Finding("error", "REFERENCE", f"model {uri!r} is not there", where)]
     if file.suffix.lower() != ".glb":
         return None, []

@@ -26,7 +26,7 @@ FIGURES_LAYER, FAILED_TABLE = "figures", "failed"
 
 FAILED_COLUMNS: dict[str, type] = {"row": int, "name": str, "error": str}
 
-OUR_OPTIONS = {"OGR_CURRENT_DATE": "1970-01-01T00:00:00.000Z", "OGR_SQLITE_SYNCHRONOUS": "OFF"}
+GDAL_OPTIONS = {"OGR_CURRENT_DATE": "1970-01-01T00:00:00.000Z", "OGR_SQLITE_SYNCHRONOUS": "OFF"}
 """GDAL's settings while we write: no time of the day, so that the same figures give the same bytes; and no waiting
 for the disk after every chunk, as a file that was broken off is thrown away anyhow."""
 
@@ -143,8 +143,8 @@ def _for_gdal(path: Path) -> Iterator[Path]:
 def _settings() -> Iterator[None]:
     from pyogrio import get_gdal_config_option, set_gdal_config_options
 
-    before = {name: get_gdal_config_option(name) for name in OUR_OPTIONS}
-    set_gdal_config_options(OUR_OPTIONS)
+    before = {name: get_gdal_config_option(name) for name in GDAL_OPTIONS}
+    set_gdal_config_options(GDAL_OPTIONS)
     try:
         yield
     finally:

@@ -8,14 +8,14 @@ from urllib.parse import unquote
 
 from exporters.errors import ExportError
 from exporters.gltf.inspect import gltf_facts
-from georef.untrusted.json_file import is_there, read_json
-from georef.untrusted.json_shape import Needed, Nullable, check_shape
+from georef.untrusted.json_file import is_plain_file, read_json
+from georef.untrusted.json_shape import Nullable, Required, check_shape
 
 FORMATS = {".czml": "CZML", ".geojson": "GeoJSON"}
 
 _FEATURE = {"properties": Nullable(dict)}
 
-FEATURES = _FEATURE | {"type": Needed(str), "features": [_FEATURE]}
+FEATURES = _FEATURE | {"type": Required(str), "features": [_FEATURE]}
 """What is taken for granted of GeoJSON."""
 
 
@@ -40,7 +40,7 @@ def places_facts(path: Path) -> dict[str, Any]:
     """Facts about a CZML or GeoJSON file: those of its model where it has one only, else the number of figures."""
     count, models = models_of(path)
     own = {"format": FORMATS[path.suffix.lower()], "files": {path.name: path.stat().st_size}}
-    if count != 1 or not models or not is_there(models[0]):
+    if count != 1 or not models or not is_plain_file(models[0]):
         return own | {"metadata": {"figures": count}}
     facts = gltf_facts(models[0])
     return facts | own | {"files": own["files"] | facts["files"]}

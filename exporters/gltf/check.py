@@ -19,7 +19,7 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, as_infos, check_place, check_solid
 from exporters.gltf.khronos import khronos_findings
 from exporters.gltf.ktx2 import size_of
-from exporters.gltf.reader import Gltf, NotReadHere, read_gltf
+from exporters.gltf.reader import Gltf, NotDecoded, read_gltf
 from exporters.gltf.shape import MESHOPT
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.image_file import MAX_TEXTURE_PX, TooLarge, check_texture
@@ -30,7 +30,7 @@ UNIT_TOLERANCE = 5e-4
 BYTE_UNIT_TOLERANCE = 2e-2
 """The same for normals of 8 bits: half a step of each of three components."""
 
-NOT_HERE = "NOT_READ_HERE"
+NOT_DECODED = "NOT_READ_HERE"
 """Code of the infos about what is not decoded here."""
 
 MAX_TEXTURES = 4
@@ -64,8 +64,8 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
             findings += _check_manifold(gltf, index, where)
             solid = check_solid(*gltf.solid_arrays(index), where)
             findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
-        except NotReadHere as reason:
-            findings.append(Finding("info", NOT_HERE, str(reason), where))
+        except NotDecoded as reason:
+            findings.append(Finding("info", NOT_DECODED, str(reason), where))
         except DamagedFile as error:
             findings.append(Finding("error", "UNREADABLE_MESH", str(error), where))
     if not external:
@@ -96,7 +96,9 @@ def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
     pixels = 0
     for index in range(len(gltf.items("images"))):
         if pixels > MAX_TEXTURES * MAX_TEXTURE_PX:
-            yield Finding("info", NOT_HERE, f"images/{index} and all after it: more pixels than are looked into", name)
+            yield Finding(
+                "info", NOT_DECODED, f"images/{index} and all after it: more pixels than are looked into", name
+            )
             break
         pixels += yield from _check_image(gltf, index, f"{name}: images/{index}")
     yield from _check_property_tables(gltf)
@@ -107,8 +109,8 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
     accessor = gltf.items("accessors")[index]
     try:
         values = gltf.accessor(index)
-    except NotReadHere as reason:
-        yield Finding("info", NOT_HERE, str(reason), where)
+    except NotDecoded as reason:
+        yield Finding("info", NOT_DECODED, str(reason), where)
         return
     except DamagedFile as error:
         yield Finding("error", "ACCESSOR", str(error), where)
@@ -138,8 +140,8 @@ def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None,
             size_of(data)
             return 0
         return check_texture(data)
-    except (NotReadHere, TooLarge) as reason:
-        yield Finding("info", NOT_HERE, str(reason), where)
+    except (NotDecoded, TooLarge) as reason:
+        yield Finding("info", NOT_DECODED, str(reason), where)
     except DamagedFile as error:
         yield Finding("error", "IMAGE", str(error), where)
     return 0
@@ -148,7 +150,7 @@ def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None,
 def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bool) -> Iterator[Finding]:
     attributes = primitive["attributes"]
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-        raise NotReadHere("compressed with Draco")
+        raise NotDecoded("compressed with Draco")
     if "POSITION" not in attributes:
         yield Finding("error" if ours else "info", "NO_POSITION", "no positions: nothing is drawn", where)
         return

@@ -14,7 +14,7 @@ from exporters.node_packages import find_package
 
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info", "info")  # the fourth are hints
 
-BLIND_SPOTS = ("UNSUPPORTED_EXTENSION", "UNUSED_OBJECT")
+IGNORED_CODES = ("UNSUPPORTED_EXTENSION", "UNUSED_OBJECT")
 """Infos that only say that it does not know the extensions which we check here, nor what they refer to."""
 
 TIMEOUT_S = 120
@@ -52,5 +52,5 @@ def khronos_findings(path: Path, ktx2: frozenset[str] = frozenset()) -> list[Fin
             f"{path.name}: {message.get('pointer') or message.get('offset', '')}",
         )
         for message in json.loads(run.stdout)["issues"]["messages"]
-        if message["code"] not in BLIND_SPOTS and message.get("pointer", "").removesuffix("/mimeType") not in ktx2
+        if message["code"] not in IGNORED_CODES and message.get("pointer", "").removesuffix("/mimeType") not in ktx2
     ]

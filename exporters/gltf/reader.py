@@ -30,7 +30,7 @@ DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 MAX_BYTES = 1 << 30
 """Largest file, or file beside it, that is read: 3D Tiles' clients give up at a tenth."""
 
-FREE_NUMBERS, NUMBERS_A_BYTE = 1 << 22, 64
+FREE_NUMBERS, NUMBERS_PER_BYTE = 1 << 22, 64
 """How many numbers accessors may give: so many, and so many more for each byte of the buffers. Sound files are read
 some ten times over; a hundred thousand accessors of the same bytes would take hours. What nodes show counts as well."""
 
@@ -40,7 +40,7 @@ MAX_SCENE_VERTICES = 20_000_000
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
-class NotReadHere(DamagedFile):
+class NotDecoded(DamagedFile):
     """Sound data in a form that is not decoded here, or whose decoder is not installed."""
 
 
@@ -100,7 +100,7 @@ class Gltf:
     def view(self, index: int) -> bytes:
         """The bytes of a buffer view, decompressed if they are compressed.
 
-        Raises DamagedFile where it lies outside its buffer, NotReadHere without the decoder.
+        Raises DamagedFile where it lies outside its buffer, NotDecoded without the decoder.
         """
         view = self.item("bufferViews", index)
         for name in MESHOPT:
@@ -110,7 +110,7 @@ class Gltf:
                 try:
                     return meshopt.decode(self._span(packed, index), packed)
                 except ExportError as error:
-                    raise NotReadHere(f"bufferView {index}: {error.finding}; {error.remedy}") from error
+                    raise NotDecoded(f"bufferView {index}: {error.finding}; {error.remedy}") from error
         return self._span(view, index)
 
     def _span(self, view: dict[str, Any], index: int) -> bytes:
@@ -123,15 +123,15 @@ class Gltf:
         return data[begin : begin + length]
 
     def _charge(self, numbers: int) -> None:
-        """Count what is asked of the file. Raises NotReadHere beyond `FREE_NUMBERS` and `NUMBERS_A_BYTE`."""
+        """Count what is asked of the file. Raises NotDecoded beyond `FREE_NUMBERS` and `NUMBERS_PER_BYTE`."""
         self._given[0] += numbers
-        if self._given[0] > FREE_NUMBERS + NUMBERS_A_BYTE * sum(map(len, self.buffers)):
-            raise NotReadHere("its accessors hold far more than the file does")
+        if self._given[0] > FREE_NUMBERS + NUMBERS_PER_BYTE * sum(map(len, self.buffers)):
+            raise NotDecoded("its accessors hold far more than the file does")
 
     def accessor(self, index: int) -> NDArray[Any]:
         """An accessor's values, (N,) or (N, width), sparse replacements applied.
 
-        Raises DamagedFile out of bounds, NotReadHere for more than a file of this size has to say.
+        Raises DamagedFile out of bounds, NotDecoded for more than a file of this size has to say.
         """
         accessor = self.item("accessors", index)
         if accessor["type"] not in WIDTHS:
@@ -194,7 +194,7 @@ class Gltf:
     def mesh_arrays(self, mesh: int = 0, primitive: int = 0) -> tuple[NDArray[Any], NDArray[np.int64]]:
         """Positions (V, 3) and triangles (F, 3) of one primitive, in the frame of its mesh.
 
-        Strips and fans become triangles; points and lines have none. Raises NotReadHere for Draco's compression.
+        Strips and fans become triangles; points and lines have none. Raises NotDecoded for Draco's compression.
         """
         item = self.primitives(mesh)[primitive]
         positions = self._positions(item)
@@ -211,7 +211,7 @@ class Gltf:
     def _positions(self, primitive: dict[str, Any]) -> NDArray[Any]:
         """(V, 3), none where a primitive has no positions."""
         if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-            raise NotReadHere("compressed with Draco")
+            raise NotDecoded("compressed with Draco")
         if "POSITION" not in primitive["attributes"]:
             return np.empty((0, 3), np.float32)
         return self.vectors(primitive["attributes"]["POSITION"], 3)
@@ -300,7 +300,7 @@ class Gltf:
 
 def _counted(count: int, more: int) -> int:
     if count + more > MAX_SCENE_VERTICES:
-        raise NotReadHere(f"more than {MAX_SCENE_VERTICES / 1e6:.0f} million vertices or triangles in its scene")
+        raise NotDecoded(f"more than {MAX_SCENE_VERTICES / 1e6:.0f} million vertices or triangles in its scene")
     return count + more
 
 

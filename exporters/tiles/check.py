@@ -26,8 +26,8 @@ from exporters.tiles.volumes import Matrix, Volume, read_transform, volume_probl
 from georef.errors import PlacementError
 from georef.geodesy import ecef_from_tile
 from georef.untrusted.damage import DamagedFile, decoding
-from georef.untrusted.json_file import is_there, read_json
-from georef.untrusted.json_shape import Needed, check_shape
+from georef.untrusted.json_file import is_plain_file, read_json
+from georef.untrusted.json_shape import Required, check_shape
 
 INSIDE_TOLERANCE_M = 1e-6
 """Vertices this far outside a volume pass: float64 ECEF coordinates are good to 1e-9 m, boxes may be shared."""
@@ -38,7 +38,7 @@ CHILD_TOLERANCE_M = 1e-3
 PLACE_TOLERANCE_M, TURN_TOLERANCE_DEG = 1e-3, 0.01
 """What we promise of the feet and the nose."""
 
-MAX_SAME_FILE = 20
+MAX_VISITS_PER_FILE = 20
 """How often one file is looked into: tilesets may name it a million times, and each other twice, without end."""
 
 SINCE_1_1 = ("schema", "schemaUri", "metadata", "groups", "contents", "implicitTiling")
@@ -47,7 +47,7 @@ _CONTENT = {"uri": str, "url": str}
 _TILE: dict[str, Any] = {"content": _CONTENT, "contents": [_CONTENT]}
 _TILE["children"] = [_TILE]
 
-TILESET = {"asset": dict, "root": Needed(_TILE), "groups": list, "extensionsRequired": [str]}
+TILESET = {"asset": dict, "root": Required(_TILE), "groups": list, "extensionsRequired": [str]}
 """What is taken for granted of a tileset; numbers are checked one by one, as what is wrong with them is worth a
 finding."""
 
@@ -58,7 +58,7 @@ def check_tileset(path: Path, external: bool = True) -> list[Finding]:
     path : the tileset.json or its folder; external : as for `check_gltf`
     """
     path = path / "tileset.json" if path.is_dir() else path
-    return list(_check_file(path, external, _Above(np.eye(4), (), math.inf, False), frozenset(), Counter()))
+    return list(_check_file(path, external, _Inherited(np.eye(4), (), math.inf, False), frozenset(), Counter()))
 
 
 def read_tileset(path: Path) -> dict[str, Any]:
@@ -75,7 +75,7 @@ def read_tileset(path: Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class _Above:
+class _Inherited:
     """What a tile has from those above it: their transform and volumes, the last one's error, if it was ever turned."""
 
     matrix: Matrix
@@ -85,7 +85,7 @@ class _Above:
 
 
 def _check_file(
-    path: Path, external: bool, above: _Above, chain: frozenset[Path], looks: Counter[Path]
+    path: Path, external: bool, above: _Inherited, chain: frozenset[Path], visits: Counter[Path]
 ) -> Iterator[Finding]:
     name = path.name
     if path.resolve() in chain:
@@ -116,7 +116,7 @@ def _check_file(
         yield from check_entity(group, schema, f"{name}: groups/{index}")
     ours = asset.get("generator") == "fig2mesh"
     up_axis = str(asset.get("gltfUpAxis", "Y")).upper()
-    walk = _Walk(path, external, chain | {path.resolve()}, looks, schema, version == "1.0", ours, up_axis)
+    walk = _Walk(path, external, chain | {path.resolve()}, visits, schema, version == "1.0", ours, up_axis)
     yield from walk.too_new(document, name)
     yield from walk.tile(document["root"], replace(above, error=min(error, above.error)), f"{name}: root")
 
@@ -128,7 +128,7 @@ class _Walk:
     path: Path
     external: bool
     chain: frozenset[Path]
-    looks: Counter[Path]
+    visits: Counter[Path]
     schema: dict[str, Any] | None
     old: bool
     ours: bool
@@ -140,7 +140,7 @@ class _Walk:
                 if key in item:
                     yield Finding("warning", "VERSION_1_1", f"{key} is not of version 1.0", where)
 
-    def tile(self, tile: dict[str, Any], above: _Above, where: str) -> Iterator[Finding]:
+    def tile(self, tile: dict[str, Any], above: _Inherited, where: str) -> Iterator[Finding]:
         local, problem, unusual = read_transform(tile.get("transform"))
         if problem:
             yield Finding("error", "TRANSFORM", problem, where)
@@ -173,12 +173,12 @@ class _Walk:
                 severity: Severity = "warning" if self.ours else "info"
                 yield Finding(severity, "CHILD_VOLUME", f"reaches {out:.3g} m out of its parent's volume", where)
             volumes = (*volumes, volume)
-        here = _Above(matrix, volumes, error, above.placed or "transform" in tile)
+        here = _Inherited(matrix, volumes, error, above.placed or "transform" in tile)
         yield from self.contents(tile, here, where)
         for index, child in enumerate(tile.get("children", [])):
             yield from self.tile(child, here, f"{where}/children/{index}")
 
-    def contents(self, tile: dict[str, Any], here: _Above, where: str) -> Iterator[Finding]:
+    def contents(self, tile: dict[str, Any], here: _Inherited, where: str) -> Iterator[Finding]:
         if "implicitTiling" in tile:
             yield Finding("info", "NOT_CHECKED", "implicit tiling: its subtrees are not looked into", where)
             return
@@ -195,25 +195,25 @@ class _Walk:
             # Before 1.0 was final, and in old exports since, the name was url.
             yield from self.content(str(content.get("uri", content.get("url", ""))), inner, where)
 
-    def content(self, uri: str, here: _Above, where: str) -> Iterator[Finding]:
+    def content(self, uri: str, here: _Inherited, where: str) -> Iterator[Finding]:
         if uri.startswith(("http:", "https:", "data:", "//")):
             yield Finding("info", "NOT_CHECKED", f"content {uri[:60]} is elsewhere", where)
             return
         file = self.path.parent / unquote(uri)
-        if not is_there(file):
+        if not is_plain_file(file):
             file = self.path.parent / unquote(uri.partition("?")[0].partition("#")[0])
-        if not uri or not is_there(file):
+        if not uri or not is_plain_file(file):
             yield Finding("error", "CONTENT", f"content {uri!r} is not there", where)
             return
-        self.looks[file.resolve()] += 1
-        if (count := self.looks[file.resolve()]) > MAX_SAME_FILE:
-            if count == MAX_SAME_FILE + 1:
-                message = f"{uri}: named more than {MAX_SAME_FILE} times, the others are not looked into"
+        self.visits[file.resolve()] += 1
+        if (count := self.visits[file.resolve()]) > MAX_VISITS_PER_FILE:
+            if count == MAX_VISITS_PER_FILE + 1:
+                message = f"{uri}: named more than {MAX_VISITS_PER_FILE} times, the others are not looked into"
                 yield Finding("info", "NOT_CHECKED", message, where)
             return
         content = read_content(file, self.external, self.up_axis)
         if content.kind == "tileset":
-            yield from _check_file(file, self.external, here, self.chain, self.looks)
+            yield from _check_file(file, self.external, here, self.chain, self.visits)
             return
         yield from content.findings
         if self.old and file.suffix.lower() in (".glb", ".gltf"):
@@ -228,7 +228,7 @@ class _Walk:
         yield from _check_place(content, here, f"{where}: {uri}")
 
 
-def _check_place(content: Content, here: _Above, where: str) -> Iterator[Finding]:
+def _check_place(content: Content, here: _Inherited, where: str) -> Iterator[Finding]:
     """A figure's place by the transforms above it against the one that its file records."""
     if content.georeference is None:
         return

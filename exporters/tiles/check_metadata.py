@@ -16,11 +16,11 @@ from exporters.errors import ExportError
 from exporters.findings import Finding
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import read_json
-from georef.untrusted.json_shape import WHOLE, Needed, Values, check_shape
+from georef.untrusted.json_shape import INDEX, Required, Values, check_shape
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
-_PROPERTY = {"type": str, "componentType": str, "array": bool, "count": WHOLE, "required": bool, "enumType": str}
+_PROPERTY = {"type": str, "componentType": str, "array": bool, "count": INDEX, "required": bool, "enumType": str}
 
 SCHEMA = {
     "classes": Values({"properties": Values(_PROPERTY)}),
@@ -56,7 +56,7 @@ def check_entity(entity: Any, schema: dict[str, Any] | None, where: str) -> Iter
     entity : {"class", "properties"}; schema : that of its tileset, None if it has none
     """
     try:
-        check_shape(entity, {"class": Needed(str), "properties": dict}, "metadata")
+        check_shape(entity, {"class": Required(str), "properties": dict}, "metadata")
     except DamagedFile as error:
         yield Finding("error", "METADATA", str(error), where)
         return

@@ -28,12 +28,12 @@ from exporters.write import OutputPath, check_file
 CONTENT_FOLDER = "figures"
 INDEX, ENTITIES = "index.geojson", "figures.czml"
 
-LONGEST_NAME = 60
+MAX_NAME_CHARACTERS = 60
 """Characters of a file name; file systems allow 255 bytes, and a character takes up to four."""
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenTileset:
     """What `write_figures` has written.
 
     figures : their number; tallest_m : height of the tallest one; files : the tileset.json last
@@ -52,7 +52,7 @@ def write_figures(
     version: TilesVersion = "1.1",
     overwrite: bool = False,
     link: bool = False,
-) -> Written:
+) -> WrittenTileset:
     """Gather figures from files into one tileset, whole or not at all.
 
     sources : as for `exporters.figure_reader.read_figures`; a file that is met twice is one figure
@@ -84,7 +84,7 @@ def write_figures(
 
     outdated = list(_own_files(main)) if overwrite and main.is_file() else []
     tallest_m = max(figure.placement.figure_height_m for figure in figures)
-    return Written(len(figures), tallest_m, write_whole(folder, main, fill, overwrite, outdated))
+    return WrittenTileset(len(figures), tallest_m, write_whole(folder, main, fill, overwrite, outdated))
 
 
 def write_tree(
@@ -146,7 +146,7 @@ def _named(figures: list[PlacedFigure], suffix: str) -> list[tuple[PlacedFigure,
     numbers: dict[str, int] = {}
     pairs = []
     for figure in figures:
-        stem = safe_name(figure.name)[:LONGEST_NAME]
+        stem = safe_name(figure.name)[:MAX_NAME_CHARACTERS]
         while True:
             number = numbers[stem] = numbers.get(stem, 0) + 1
             base = stem if number == 1 else f"{stem}_{number}"

@@ -12,7 +12,7 @@ from exporters.georeference import placement_of_tile
 from exporters.gltf.inspect import gltf_facts
 from exporters.tiles.check import read_tileset
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.json_shape import NUMBER, Needed, check_shape
+from georef.untrusted.json_shape import NUMBER, Required, check_shape
 
 
 def tileset_facts(path: Path) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def tileset_facts(path: Path) -> dict[str, Any]:
     while tile is not None:
         uri = tile.get("content", {}).get("uri")
         if uri and uri.lower().endswith((".glb", ".gltf")):
-            check_shape(tile, {"geometricError": Needed(NUMBER)}, f"tile of {uri[:40]}")
+            check_shape(tile, {"geometricError": Required(NUMBER)}, f"tile of {uri[:40]}")
             lods.append({"uri": uri, "geometric_error_m": tile["geometricError"]})
         children = tile.get("children", [])
         tile = children[0] if len(children) == 1 else None

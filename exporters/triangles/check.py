@@ -10,7 +10,7 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, check_solid
 from exporters.solid import merged_by_position
 from exporters.triangles.files import read_triangles, references_of
-from georef.untrusted.json_file import is_there
+from georef.untrusted.json_file import is_plain_file
 
 
 def check_triangles(path: Path) -> list[Finding]:
@@ -33,5 +33,5 @@ def _check_references(path: Path) -> list[Finding]:
     return [
         Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
         for file, word, name, target in references_of(path)
-        if not is_there(target)
+        if not is_plain_file(target)
     ]

@@ -14,8 +14,8 @@ import numpy as np
 
 from exporters.errors import ExportError
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.image_file import check_head
-from georef.untrusted.json_file import is_there, read_bytes
+from georef.untrusted.image_file import check_header
+from georef.untrusted.json_file import is_plain_file, read_bytes
 
 MAX_TRIANGLE_BYTES = 256 << 20
 """Largest PLY or OBJ that is read: some 10 million triangles; trimesh needs about ten times as much memory."""
@@ -38,7 +38,7 @@ def references_of(path: Path) -> list[Reference]:
     Raises ExportError for more than `MAX_REFERENCES`, and for a file that cannot be read.
     """
     libraries = list(_named(path, "mtllib", MAX_TRIANGLE_BYTES))
-    there = [library for *_, library in libraries if is_there(library)]
+    there = [library for *_, library in libraries if is_plain_file(library)]
     found = libraries + [texture for each in there for texture in _named(each, "map_Kd", MAX_LIBRARY_BYTES)]
     if len(found) > MAX_REFERENCES:
         raise ExportError(path, f"names {len(found)} files", f"give a model with at most {MAX_REFERENCES}")
@@ -65,7 +65,7 @@ def check_triangle_file(path: Path) -> None:
         try:
             data = read_bytes(target, limit)
             if word == "map_Kd":
-                check_head(data)
+                check_header(data)
         except (OSError, DamagedFile) as error:
             raise ExportError(file, f"{word} {name[:80]}: {error}", "give the model with its own files") from None
 

@@ -29,25 +29,25 @@ MAX_MEMORY = 8 << 30
 """Of the process's addresses, where the system can limit them."""
 
 
-class UsdFault(RuntimeError):
+class UsdProcessError(RuntimeError):
     """A fault of ours in the process that reads USD, with the place where it was raised."""
 
 
-def check_usd_apart(path: Path) -> list[Finding]:
+def check_usd_isolated(path: Path) -> list[Finding]:
     """As `exporters.usd.check.check_usd`; a file that ends the process is unreadable."""
     try:
-        return [Finding(**each) for each in _asked("check", path)]
+        return [Finding(**each) for each in _run_isolated("check", path)]
     except ExportError as error:
         return [Finding("error", "UNREADABLE", error.finding, path.name)]
 
 
-def usd_facts_apart(path: Path) -> dict[str, Any]:
+def usd_facts_isolated(path: Path) -> dict[str, Any]:
     """As `exporters.usd.inspect.usd_facts`. Raises ExportError, also for a file that ends the process."""
-    facts: dict[str, Any] = _asked("facts", path)
+    facts: dict[str, Any] = _run_isolated("facts", path)
     return facts
 
 
-def _asked(question: str, path: Path) -> Any:
+def _run_isolated(question: str, path: Path) -> Any:
     command = [sys.executable, "-m", "exporters.usd.process", question, os.path.abspath(path)]
     with tempfile.TemporaryDirectory(prefix="fig2mesh-") as folder:
         # Reports of crashes go there as well.
@@ -63,7 +63,7 @@ def _asked(question: str, path: Path) -> Any:
     if "error" in answer:
         raise ExportError(path, answer["error"]["finding"], answer["error"]["remedy"])
     if "fault" in answer:
-        raise UsdFault(f"{answer['fault']}\n{answer['where']}")
+        raise UsdProcessError(f"{answer['fault']}\n{answer['where']}")
     return answer["found"]
 
 
