@@ -1,6 +1,6 @@
-"""What the readers of glTF take for granted of a document, which `exporters.gltf.reader` checks before.
+"""Shape of glTF documents, which `exporters.gltf.reader` checks before using them.
 
-Only members that are used here are named; the full rules are for the Khronos validator. Extras may be anything.
+Only members that are used here are included; the Khronos validator checks all rules. Extras may be anything.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#properties-reference
 """

@@ -24,7 +24,7 @@ MAX_TEXTURE_PX = 1 << 26
 """Limit of pixels of a decoded texture: 8192 x 8192, beyond which clients scale down or fail; 268 MB as RGBA."""
 
 MAX_UNWEIGHED_SCANS, MAX_SCANNED_PX = 20, 1_000_000_000
-"""Limits of progressive JPEGs. They usually have some ten scans over the whole picture; a few kilobytes with 10,000 empty
+"""Limits of progressive JPEGs. They have some ten scans over the whole picture; a few kilobytes with 10,000 empty
 scans take hours. More scans than the first limit are allowed if scans times pixels are below the second."""
 
 
