@@ -14,7 +14,7 @@ SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 li
 class FigureError(InputError):
     """The picture, mask, joints or part labels of a figure cannot be used."""
 
-    lasting = True
+    permanent = True
 
 
 class OutputError(InputError):

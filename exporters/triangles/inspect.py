@@ -1,4 +1,4 @@
-"""What is in a PLY or OBJ file."""
+"""Facts about PLY and OBJ files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from exporters.triangles.files import read_triangles
 
 
 def triangle_facts(path: Path) -> dict[str, Any]:
-    """Facts about a .ply or .obj file; see `exporters.inspect.inspect`."""
+    """Return facts about a .ply or .obj file; see `exporters.inspect.inspect`."""
     mesh = read_triangles(path)
     vertices, faces = merged_by_position(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     image = getattr(getattr(mesh.visual, "material", None), "image", None)
@@ -32,7 +32,7 @@ def triangle_facts(path: Path) -> dict[str, Any]:
 
 
 def _comments(path: Path) -> dict[str, Any]:
-    """Credits and place from the comments that our PLY and OBJ writers put at the top."""
+    """Read credits and place from the comments at the top that fig2mesh writes."""
     facts: dict[str, Any] = {}
     place: dict[str, Any] = {}
     with path.open("rb") as stream:

@@ -78,7 +78,7 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
             fault = error
             # What the disk refuses may go well next time; what is wrong with the input will not.
             record |= {"status": "failed", "error": batch.roots.shorten(_line(error))}
-            record["lasting"] = "key" in record and error.lasting
+            record["lasting"] = "key" in record and error.permanent
         except Exception as error:
             fault = error
             found = f"internal error: {type(error).__name__}: {_line(error)}"

@@ -43,7 +43,7 @@ def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verb
     depth. Beside the tileset come index.geojson, a map of the figures, and figures.czml, which stands on terrain.
     """
     from exporters.tiles.gather import write_figures
-    from exporters.tiles.tileset import too_near_note
+    from exporters.tiles.tileset import short_range_warning
 
     configure_logging(quiet, verbose)
     written = write_figures(
@@ -54,6 +54,6 @@ def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verb
         overwrite=request.overwrite,
         link=request.link,
     )
-    if note := too_near_note(request.visible_from, written.tallest_m):
+    if note := short_range_warning(request.visible_from, written.tallest_m):
         log.warning("%s", note)
     log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))

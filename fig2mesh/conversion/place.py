@@ -164,9 +164,9 @@ def _record(request: PlaceRequest, sheet: MapSheet, spot: SheetPlace, pixel: tup
         "degrees_of_freedom": None if quality is None else quality.degrees_of_freedom,
         "rmse_m": None if quality is None else quality.rmse_m,
         "sigma_m": None if quality is None else quality.sigma_m,
-        "left_out_rmse_m": None if quality is None else quality.left_out_rmse_m,
+        "left_out_rmse_m": None if quality is None else quality.leave_one_out_rmse_m,
         "residuals_m": [] if quality is None else list(quality.residuals_m),
-        "left_out_m": [] if quality is None else list(quality.left_out_m),
+        "left_out_m": [] if quality is None else list(quality.leave_one_out_m),
         "pixel": list(pixel),
         "lonlat": [spot.lon_deg, spot.lat_deg],
         "metres_per_pixel": {"up": spot.up_m, "across": spot.across_m},
@@ -185,8 +185,8 @@ def _summary(sheet: MapSheet, spot: SheetPlace) -> str:
     if sheet.quality is None:
         return f"{sheet.file}: {where}"
     quality, count = sheet.quality, len(sheet.pixels)
-    if quality.left_out_rmse_m is not None:
-        fit = f"each missed by {quality.left_out_rmse_m:.3g} m (RMS) when left out"
+    if quality.leave_one_out_rmse_m is not None:
+        fit = f"each missed by {quality.leave_one_out_rmse_m:.3g} m (RMS) when left out"
     elif quality.degrees_of_freedom == 0:
         fit = "no more than it needs, so nothing checks it"
     else:

@@ -14,7 +14,7 @@ from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, si
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import PART_NAMES
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.image_file import NoPicture, TooLarge, check_scans, open_head, pillow
+from georef.untrusted.image_file import NotAPicture, TooLarge, check_scans, open_header, pillow
 
 OPAQUE = np.array([0, 0, 0, 255], np.uint8)
 
@@ -65,7 +65,7 @@ def _open(path: Path, what: str) -> Image.Image:
     try:
         if path.exists() and not path.is_file():  # reading a pipe would block, and a device never ends
             raise FigureError(path, "cannot be read (not a regular file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
-        image = open_head(path, FORMATS)
+        image = open_header(path, FORMATS)
         if image.width * image.height > MAX_PIXELS:
             raise TooLarge(f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx")
         check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
@@ -75,7 +75,7 @@ def _open(path: Path, what: str) -> Image.Image:
         return image
     except TooLarge as error:
         raise FigureError(path, str(error), "pass --bbox X0 Y0 X1 Y1 round the figure") from None
-    except NoPicture:
+    except NotAPicture:
         raise FigureError(path, "not a picture that can be read", f"give a PNG, JPEG, TIFF or WebP as {what}") from None
     except DamagedFile as error:
         raise FigureError(path, f"cannot be read ({error})", intact) from None

@@ -273,7 +273,7 @@ def test_tiles_tools_reads_version_1_0(four: Path, tmp_path: Path, tiles_tools: 
 @pytest.mark.parametrize("version", ["1.0", "1.1"])
 def test_py3dtiles_reads_many(four: Path, tmp_path: Path, version: str) -> None:
     write_figures([four], tmp_path / "out", version=version)
-    found = py3dtiles.read("py3dtiles_read.py", tmp_path / "out" / "tileset.json")
+    found = py3dtiles.read("py3dtiles_contents.py", tmp_path / "out" / "tileset.json")
     assert found["version"] == version
     assert found["tiles"] == 7
     assert len(found["contents"]) == 6

@@ -64,7 +64,7 @@ def test_a_failure_midway_leaves_the_disk_as_it_was(
         real(source, destination)
 
     monkeypatch.setattr(os, "replace", replace)
-    files = {"tiles": 3, "a.usda": 3}.get(Path(target).name) or len(FORMATS[Path(target).suffix].beside) + 1
+    files = {"tiles": 3, "a.usda": 3}.get(Path(target).name) or len(FORMATS[Path(target).suffix].companions) + 1
     if failing >= files:
         assert len(write(OTHER, tmp_path / target, overwrite=True)) == files
         return

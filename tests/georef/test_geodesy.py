@@ -190,7 +190,7 @@ def test_shapes_pass_through():
 
 @pytest.mark.parametrize("bad", [(0, 90.1, 0), (0, np.nan, 0), (np.inf, 0, 0)])
 def test_places_that_do_not_exist(bad):
-    with pytest.raises(PlacementError, match="is no place"):
+    with pytest.raises(PlacementError, match="is not on the earth"):
         ecef_from_geodetic([(0, 0, 0), bad])
     with pytest.raises(PlacementError):
         enu_at(*bad)

@@ -98,7 +98,7 @@ def test_nodata_is_an_error(tmp_path):
 
 def test_a_terrain_model_is_not_a_geoid(tmp_path):
     terrain = write_gtx(tmp_path / "dem.gtx", 46.0, 7.0, 1.0, np.full((3, 3), 408.0))
-    with pytest.raises(PlacementError, match="408 m at the place is no height of a geoid"):
+    with pytest.raises(PlacementError, match="408 m at the location is not a plausible geoid height"):
         ellipsoidal_height(8.0, 47.0, 400.0, terrain)
 
 
@@ -125,7 +125,7 @@ def test_other_findings_name_the_datum_and_the_remedy(tmp_path):
         ellipsoidal_height(8.0, 47.0, 400.0, "egm2008")
     text = tmp_path / "grid.txt"
     text.write_text("1 2 3")
-    with pytest.raises(PlacementError, match=r"its suffix is '.txt'; give a geoid grid"):
+    with pytest.raises(PlacementError, match=r"unknown suffix '.txt'; give a geoid grid"):
         grid_path(text)
     comma = tmp_path / "a,b.gtx"
     comma.write_bytes(b"")
@@ -137,9 +137,9 @@ def test_other_findings_name_the_datum_and_the_remedy(tmp_path):
         ellipsoidal_height(47.0, 97.0, 0.0)
 
 
-def test_egm96_without_its_grid_says_so(tmp_path, monkeypatch):
+def test_a_missing_egm96_grid_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(heights, "EGM96_GRID", tmp_path / "egm96_15.tif")
-    with pytest.raises(PlacementError, match=r"--altitude-datum egm96: .*egm96_15\.tif is missing; install"):
+    with pytest.raises(PlacementError, match=r"--altitude-datum egm96: .*egm96_15\.tif is missing; reinstall"):
         ellipsoidal_height(8.5, 47.4, 400.0, "egm96")
 
 

@@ -15,7 +15,7 @@ from fig2mesh.texture.sides import SideViews, body_labels
 from fig2mesh.texture.space import inwards
 from fig2mesh.training.samples.build import read_shard, shards
 from fig2mesh.training.samples.texture_data import Drawings, load_drawings
-from fig2mesh.training.samples.unfold import front_scale, places
+from fig2mesh.training.samples.unfold import extend_colours, front_scale, places
 
 FACE_WIDTH, FACE_UP, FACE_DOWN = 0.9, 0.35, 1.2
 """Half axes of the region of drawn features about the eyes, relative to their distance from the head's middle."""

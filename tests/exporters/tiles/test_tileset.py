@@ -17,8 +17,8 @@ from exporters.gltf.reader import read_gltf
 from exporters.tiles.tileset import (
     VISIBLE_RANGE_PER_ERROR,
     root_tile,
+    short_range_warning,
     tileset,
-    too_near_note,
     visible_range,
     write_tileset,
 )
@@ -80,9 +80,9 @@ def test_a_person_has_a_range_of_two_kilometres() -> None:
 
 
 def test_a_range_of_less_than_ten_heights_is_noted() -> None:
-    assert too_near_note(None, 6186.2) is None
-    assert too_near_note(18_000.0, 1800.0) is None
-    note = too_near_note(2000.0, 1800.0)
+    assert short_range_warning(None, 6186.2) is None
+    assert short_range_warning(18_000.0, 1800.0) is None
+    note = short_range_warning(2000.0, 1800.0)
     assert note is not None
     assert note.startswith("--visible-from: from farther than 2000 m a figure 1800 m tall is not drawn")
     assert "\n" not in note

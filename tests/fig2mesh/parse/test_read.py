@@ -121,7 +121,7 @@ CASES = {
     "missing joint": "l_knee",
     "renamed joint": "left_knee",
     "extra joint": "tail",
-    "nan": "NaN is no number",
+    "nan": "NaN is not a number",
     "huge": "larger than 2^64",
     "text joint": "l_knee",
     "outside": "l_knee at (405, 3) is outside",
