@@ -26,6 +26,7 @@ def readme_commands() -> list[list[str]]:
 
 
 @pytest.mark.parametrize("name", ["farmer", "footballer", "market_woman"])
+@pytest.mark.slow
 def test_shipped_figures_become_valid_models(tmp_path: Path, name: str) -> None:
     *outputs, picture = run(tmp_path, name, quality="draft")
     for output in outputs:

@@ -155,6 +155,7 @@ def digest(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
+@pytest.mark.slow
 def test_same_input_and_seed_same_bytes(finished: Run, tmp_path: Path) -> None:
     for name in ("first", "second"):
         out = tmp_path / name

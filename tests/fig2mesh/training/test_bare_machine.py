@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from fig2mesh.training.bodies.pack import save_pack
 from tests.fig2mesh.training.figures import capsule_pack
 
@@ -39,6 +41,7 @@ print("done")
 """
 
 
+@pytest.mark.slow
 def test_samples_and_a_training_step_need_only_numpy_and_torch(tmp_path: Path) -> None:
     save_pack(capsule_pack(), tmp_path / "pack.npz")
     done = subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path)], capture_output=True, text=True, check=False)

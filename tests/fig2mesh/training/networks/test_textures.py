@@ -80,6 +80,7 @@ def test_data_without_pictures_is_one_line(tmp_path: Path) -> None:
         load_drawings(tmp_path, ("train",), pictures=True)
 
 
+@pytest.mark.slow
 def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: Path, tmp_path: Path) -> None:
     """From depth alone an ellipsoid looks the same from two sides; its parts distinguish them."""
     errors = {}
@@ -95,6 +96,7 @@ def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: 
     assert errors[True] < 0.7 * errors[False]
 
 
+@pytest.mark.slow
 def test_networks_of_unseen_sides_learn_one_after_the_other(data: Path, tmp_path: Path) -> None:
     """Coordinates cannot find the colour of the back in the front; the refining networks can learn it."""
     found = train_fill(data, tmp_path, Schedule(steps=20))
