@@ -57,11 +57,11 @@ def read_figures(path: Path) -> Iterator[PlacedFigure]:
     elif path.suffix.lower() == ".json":
         yield from _tileset(path, frozenset(), set())
     else:
-        raise ExportError(path, "is no figure that a tileset can hold", "give .glb files, tilesets or folders of them")
+        raise ExportError(path, "not a figure for a tileset", "give .glb files, tilesets or folders of them")
 
 
 def read_figure(path: Path) -> PlacedFigure:
-    """The record of one .glb file, its one content. Raises ExportError where it has no place or is no glTF."""
+    """Read the record of one .glb file, its only content. Raises ExportError if it has no place or is not glTF."""
     gltf = open_glb(path)
     record = gltf.extras.get("georeference")
     if not isinstance(record, dict):

@@ -35,7 +35,7 @@ MAX_RESIDUAL_SHARE = 0.03
 reference system probably do not belong to this sheet: pictorial maps are drawn freely, but not that freely."""
 
 MAX_LON, MAX_LAT = 800.0, 100.0
-"""Larger numbers cannot be angles, in degrees or grads, whatever reference system a file names."""
+"""Larger numbers cannot be angles in degrees or grads, in any reference system."""
 
 MAX_SILENT_ACCURACY_M = 1.0
 """Threshold above which the accuracy of a datum transformation is reported."""
@@ -154,7 +154,7 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     """Read the georeference of a sheet.
 
     sheet : the picture, or a .points file, annotation or world file; see `georef.sheets.find`
-    transform : one of `TRANSFORMS`; auto: what the file asks for, else affine, helmert for two points
+    transform : one of `TRANSFORMS`; auto: that requested by the file, else affine, helmert for two points
     map_crs : reference system of the sheet's coordinates, where its files give none or a wrong one; for control
         points in longitude and latitude, the projection in which the transformation is fitted
 

@@ -75,7 +75,7 @@ def free_names(names: tuple[str, ...], taken: tuple[str, ...]) -> tuple[str, ...
     """Make column names unique by appending `_2`, or the first free number, to those already taken.
 
     Comparison ignores case, as in SQL: `Name` next to `name` becomes `Name_2`. The first of several equal names is
-    kept; a column that needs no number keeps its name whatever comes before it. An empty name becomes `column`.
+    kept; a column that needs no number keeps its name in any case. An empty name becomes `column`.
     """
     used = {name.casefold() for name in taken}
     found = list(names)

@@ -54,16 +54,16 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
         gltf = read_gltf(path)
     except ExportError as error:
         return [Finding("error", "UNREADABLE", error.finding, path.name)]
-    ours = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
-    findings = list(_check_document(gltf, ours))
+    own = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
+    findings = list(_check_document(gltf, own))
     for index, mesh in enumerate(gltf.items("meshes")):
         where = f"{path.name}: meshes/{index}"
         try:
             for number, primitive in enumerate(mesh["primitives"]):
-                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", ours)
+                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", own)
             findings += _check_manifold(gltf, index, where)
             solid = check_solid(*gltf.solid_arrays(index), where)
-            findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
+            findings += solid if own or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
         except NotDecoded as reason:
             findings.append(Finding("info", NOT_DECODED, str(reason), where))
         except DamagedFile as error:
@@ -75,13 +75,13 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
     return findings + khronos_findings(path, ktx2)
 
 
-def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
+def _check_document(gltf: Gltf, own: bool) -> Iterator[Finding]:
     name = gltf.path.name
     about = gltf.document.get("asset", {})
     if about.get("version") != "2.0":
         yield Finding("error", "VERSION", f"asset.version is {about.get('version')}, expected 2.0", f"{name}: asset")
     if not gltf.items("meshes"):
-        yield Finding("error" if ours else "info", "NO_MESH", "no mesh", name)
+        yield Finding("error" if own else "info", "NO_MESH", "no mesh", name)
     used = gltf.document.get("extensionsUsed", [])
     for extension in gltf.document.get("extensionsRequired", []):
         message = f"{extension}: viewers without it reject the file"
@@ -89,7 +89,7 @@ def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
         if extension not in used:
             yield Finding("error", "EXTENSION_USED", f"{extension} is required but not in extensionsUsed", name)
     place = gltf.extras.get("georeference")
-    if ours and place is not None:
+    if own and place is not None:
         yield from check_place(place, f"{name}: asset.extras.georeference")
     for index in range(len(gltf.items("accessors"))):
         yield from _check_accessor(gltf, index, f"{name}: accessors/{index}")
@@ -97,7 +97,7 @@ def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
     for index in range(len(gltf.items("images"))):
         if pixels > MAX_TEXTURES * MAX_TEXTURE_PX:
             yield Finding(
-                "info", NOT_DECODED, f"images/{index} and all after it: more pixels than are looked into", name
+                "info", NOT_DECODED, f"images/{index} and all later ones are not checked: too many pixels", name
             )
             break
         pixels += yield from _check_image(gltf, index, f"{name}: images/{index}")
@@ -147,12 +147,12 @@ def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None,
     return 0
 
 
-def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bool) -> Iterator[Finding]:
+def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, own: bool) -> Iterator[Finding]:
     attributes = primitive["attributes"]
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
         raise NotDecoded("compressed with Draco")
     if "POSITION" not in attributes:
-        yield Finding("error" if ours else "info", "NO_POSITION", "no positions: nothing is rendered", where)
+        yield Finding("error" if own else "info", "NO_POSITION", "no positions: nothing is rendered", where)
         return
     count = len(gltf.accessor(attributes["POSITION"]))
     if "min" not in gltf.item("accessors", attributes["POSITION"]):
@@ -166,7 +166,7 @@ def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bo
     if mode == 4 and len(indices) % 3:
         yield Finding("error", "NOT_TRIANGLES", f"mode {mode}, {len(indices)} indices", where)
     elif mode != 4:
-        yield Finding("error" if ours else "info", "NOT_TRIANGLES", f"mode {mode}: not a list of triangles", where)
+        yield Finding("error" if own else "info", "NOT_TRIANGLES", f"mode {mode}: not a list of triangles", where)
     if indices.max() >= count:
         # The checks below would read beyond the vertices.
         raise DamagedFile(f"index {int(indices.max())} of {count} vertices")
@@ -175,7 +175,7 @@ def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bo
         worst = float(np.abs(length - 1).max())
         if worst > (BYTE_UNIT_TOLERANCE if gltf.accessor(attributes["NORMAL"]).itemsize == 1 else UNIT_TOLERANCE):
             yield Finding("error", "NORMAL_LENGTH", f"normals are up to {worst:.2g} off unit length", where)
-    if "TEXCOORD_0" in attributes and ours:
+    if "TEXCOORD_0" in attributes and own:
         uv = gltf.numbers(attributes["TEXCOORD_0"])
         if uv.dtype.kind == "f" and (uv.min() < 0 or uv.max() > 1):
             yield Finding("warning", "TEXCOORD_RANGE", "texture coordinates outside [0, 1]", where)

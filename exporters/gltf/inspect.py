@@ -32,10 +32,10 @@ def _facts(gltf: Gltf) -> dict[str, Any]:
     vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
     faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
-    beside = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+    referenced = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
     return {
         "format": "glTF 2.0 binary" if gltf.path.suffix.lower() == ".glb" else "glTF 2.0",
-        "files": file_sizes(gltf.path, *beside),
+        "files": file_sizes(gltf.path, *referenced),
         "name": next((node["name"] for node in gltf.items("nodes") if "name" in node), None),
         "copyright": asset.get("copyright"),
         "generator": asset.get("generator"),

@@ -130,7 +130,7 @@ def _rewritten(gltf: Gltf, batched: bool) -> bytes:
     binary = _repacked(document, gltf, dropped)
     document["buffers"] = [{"byteLength": len(binary)}]
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
-    # Both chunks are padded to multiples of eight bytes, as the whole tile must be; headers add 12 + 8 + 8.
+    # Both chunks are padded to multiples of eight bytes, as the whole tile must be; the chunk headers add 12 + 8 + 8.
     text += b" " * ((4 - len(text)) % 8)
     return join_glb(text, binary)
 

@@ -113,9 +113,9 @@ def _check_file(
         yield from check_entity(document["metadata"], schema, name)
     for index, group in enumerate(document.get("groups", [])):
         yield from check_entity(group, schema, f"{name}: groups/{index}")
-    ours = asset.get("generator") == "fig2mesh"
+    own = asset.get("generator") == "fig2mesh"
     up_axis = str(asset.get("gltfUpAxis", "Y")).upper()
-    walk = _Walk(path, external, chain | {path.resolve()}, visits, schema, version == "1.0", ours, up_axis)
+    walk = _Walk(path, external, chain | {path.resolve()}, visits, schema, version == "1.0", own, up_axis)
     yield from walk.too_new(document, name)
     yield from walk.tile(document["root"], replace(above, error=min(error, above.error)), f"{name}: root")
 
@@ -130,7 +130,7 @@ class _Walk:
     visits: Counter[Path]
     schema: dict[str, Any] | None
     old: bool
-    ours: bool
+    own: bool
     up_axis: str
 
     def too_new(self, item: dict[str, Any], where: str) -> Iterator[Finding]:
@@ -145,7 +145,7 @@ class _Walk:
             yield Finding("error", "TRANSFORM", problem, where)
             return
         if unusual:
-            yield Finding("error" if self.ours else "warning", "TRANSFORM", unusual, where)
+            yield Finding("error" if self.own else "warning", "TRANSFORM", unusual, where)
         matrix = above.matrix @ local
         error = _geometric_error(tile)
         if error is None:
@@ -169,7 +169,7 @@ class _Walk:
                 excess = volumes[-1].excess_of(volume) if volumes else 0.0
             if excess > CHILD_TOLERANCE_M:
                 # Legal, as only content has to be inside; fig2mesh guarantees more.
-                severity: Severity = "warning" if self.ours else "info"
+                severity: Severity = "warning" if self.own else "info"
                 yield Finding(severity, "CHILD_VOLUME", f"reaches {excess:.3g} m out of its parent's volume", where)
             volumes = (*volumes, volume)
         here = _Inherited(matrix, volumes, error, above.placed or "transform" in tile)

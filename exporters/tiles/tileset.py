@@ -44,7 +44,7 @@ default field of view of 60 degrees across. Other screens differ by their number
 """
 
 BOX_MARGIN_M = 1e-3
-"""Margin of boxes: rounding, also to float32, must not move a vertex out of its box, nor may a box be flat."""
+"""Margin of boxes: rounding, also to a viewer's float32, must not move a vertex out of its box; no box may be flat."""
 
 
 def content_name(name: str, lod: int, version: TilesVersion = "1.1") -> str:

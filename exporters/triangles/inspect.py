@@ -19,10 +19,10 @@ def triangle_facts(path: Path) -> dict[str, Any]:
     vertices, faces = merged_by_position(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     image = getattr(getattr(mesh.visual, "material", None), "image", None)
     ply = path.suffix.lower() == ".ply"
-    beside = [] if ply else [path.with_suffix(".mtl"), path.with_name(f"{path.stem}_texture.png")]
+    companions = [] if ply else [path.with_suffix(".mtl"), path.with_name(f"{path.stem}_texture.png")]
     return {
         "format": "Stanford PLY" if ply else "Wavefront OBJ",
-        "files": file_sizes(path, *beside),
+        "files": file_sizes(path, *companions),
         "name": path.stem,
         "vertices": len(mesh.vertices),
         **solid_facts(vertices, faces),

@@ -45,7 +45,7 @@ def reason_of(error: Exception) -> str:
     return "USD cannot read it (" + " ".join(str(error).rpartition(" : '")[2].split())[:100].rstrip("'") + ")"
 
 
-def is_ours(stage: Any) -> bool:
+def is_own(stage: Any) -> bool:
     """Whether the root layer was written by fig2mesh."""
     return bool(stage.GetRootLayer().customLayerData.get("generator") == "fig2mesh")
 
@@ -90,16 +90,16 @@ def _check_stage(stage: Any, path: Path) -> list[Finding]:
     from pxr import UsdGeom
 
     findings: list[Finding] = []
-    ours = is_ours(stage)
+    own = is_own(stage)
     if UsdGeom.GetStageMetersPerUnit(stage) != 1.0 or UsdGeom.GetStageUpAxis(stage) != UsdGeom.Tokens.y:
         found = f"{UsdGeom.GetStageMetersPerUnit(stage):g} m per unit, {UsdGeom.GetStageUpAxis(stage)} up"
-        message = f"the stage has {found}" + (", not metres and Y" if ours else "")
-        findings.append(Finding("error" if ours else "info", "STAGE_UNITS", message, path.name))
-    findings += check_usd_place(stage, path.name, ours)
+        message = f"the stage has {found}" + (", not metres and Y" if own else "")
+        findings.append(Finding("error" if own else "info", "STAGE_UNITS", message, path.name))
+    findings += check_usd_place(stage, path.name, own)
     for variation in variations(stage):
         name = f"{path.name}: {variation}" if variation else path.name
         # Findings about the parts that all variants share would be repeated.
-        findings += [finding for finding in _check_selected(stage, name, ours) if not _known(finding, findings)]
+        findings += [finding for finding in _check_selected(stage, name, own) if not _known(finding, findings)]
     return findings
 
 
@@ -110,7 +110,7 @@ def _known(finding: Finding, before: list[Finding]) -> bool:
     return any(key(finding) == key(each) for each in before)
 
 
-def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
+def _check_selected(stage: Any, name: str, own: bool) -> list[Finding]:
     from pxr import UsdGeom, UsdShade, UsdValidation
 
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
@@ -126,9 +126,9 @@ def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
     prims = list(stage.Traverse())
     meshes = [UsdGeom.Mesh(prim) for prim in prims if prim.IsA(UsdGeom.Mesh)]
     if not meshes:
-        findings.append(Finding("error" if ours else "info", "NO_MESH", "no mesh", name))
+        findings.append(Finding("error" if own else "info", "NO_MESH", "no mesh", name))
     for mesh in meshes:
-        findings += _check_mesh(mesh, f"{name}: {mesh.GetPath()}", ours)
+        findings += _check_mesh(mesh, f"{name}: {mesh.GetPath()}", own)
     for prim in prims:
         shader = UsdShade.Shader(prim)
         if not shader or shader.GetIdAttr().Get() != "UsdUVTexture":
@@ -142,10 +142,10 @@ def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
     return findings
 
 
-def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
+def _check_mesh(mesh: Any, where: str, own: bool) -> list[Finding]:
     from pxr import Usd, UsdGeom
 
-    severity: Severity = "error" if ours else "info"
+    severity: Severity = "error" if own else "info"
     first = Usd.TimeCode.EarliestTime()  # the only value without animation
     findings = []
     if mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none:
@@ -155,7 +155,7 @@ def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
     points = np.array(mesh.GetPointsAttr().Get(first) or [], dtype=np.float64).reshape(-1, 3)
     counts = np.array(mesh.GetFaceVertexCountsAttr().Get(first) or [], dtype=np.int64)
     indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(first) or [], dtype=np.int64)
-    if not len(indices) and not ours:
+    if not len(indices) and not own:
         return [*findings, Finding("info", "NO_FACES", "no faces", where)]
     valid, reason = UsdGeom.Mesh.ValidateTopology(
         mesh.GetFaceVertexIndicesAttr().Get(first) or [], mesh.GetFaceVertexCountsAttr().Get(first) or [], len(points)
@@ -168,7 +168,7 @@ def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
     if not np.array_equal(extent, [points.min(axis=0), points.max(axis=0)]):
         # A larger one is valid; without one, or with a smaller one, viewers may cull visible parts.
         contains = bool((extent[0] <= points.min(axis=0)).all() and (extent[1] >= points.max(axis=0)).all())
-        extent_severity: Severity = "error" if ours else "info" if contains else "warning"
+        extent_severity: Severity = "error" if own else "info" if contains else "warning"
         findings.append(
             Finding(extent_severity, "EXTENT", f"extent is {extent.tolist()}, not that of the points", where)
         )
@@ -186,4 +186,4 @@ def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
     flip = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     faces = indices.reshape(-1, 3)[:, ::-1] if flip else indices.reshape(-1, 3)
     solid = check_solid(points, faces, where)
-    return findings + (solid if ours else as_infos(solid))
+    return findings + (solid if own else as_infos(solid))

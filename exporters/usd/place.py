@@ -36,8 +36,8 @@ def heading_of(prim: Any) -> float:
     return math.degrees(math.atan2(front[0], -front[2])) % 360.0
 
 
-def check_usd_place(stage: Any, name: str, ours: bool) -> list[Finding]:
-    """Check that all places in a stage of its default prim agree; ours : with the record too."""
+def check_usd_place(stage: Any, name: str, own: bool) -> list[Finding]:
+    """Check that all places of the default prim of a stage agree; own : also with the record, in files by fig2mesh."""
     prim = stage.GetDefaultPrim()
     if not prim:
         return []
@@ -47,7 +47,7 @@ def check_usd_place(stage: Any, name: str, ours: bool) -> list[Finding]:
     if anchor is not None and reference is not None:
         findings += check_same_place(anchor, reference, "omni:geospatial compared with cesium:anchor", where)
     record = dict(stage.GetRootLayer().customLayerData.get("georeference", {}))
-    if not ours or not (record or anchor or reference):
+    if not own or not (record or anchor or reference):
         return findings
     problems = check_place(record, f"{name}: customLayerData")
     if problems:

@@ -56,7 +56,7 @@ def read_picture(path: Path) -> SheetPicture:
             warnings.simplefilter("ignore")
             head = file.read(16)
             file.seek(0)
-            # Not Image.open, which refuses large pictures although only the header is needed.
+            # Not Image.open, which rejects large pictures although only the header is needed.
             for factory, accept in Image.OPEN.values():
                 accepted = accept is None or accept(head)
                 if accepted and not isinstance(accepted, str):

@@ -65,7 +65,13 @@ def crs_of(text: str, source: object = OPTION) -> CRS:
         if text.lstrip().startswith("{"):
             parse_json(text)
         crs = CRS.from_user_input(text.strip())
-    except (CRSError, DamagedFile, RecursionError, UnicodeError, ValueError):  # pyproj looks for JSON behind any brace
+    except (
+        CRSError,
+        DamagedFile,
+        RecursionError,
+        UnicodeError,
+        ValueError,
+    ):  # pyproj parses text after a brace as JSON
         raise PlacementError(source, f"{shown!r} is not a reference system", "give a code such as EPSG:2056") from None
     if crs.is_compound:
         crs = crs.sub_crs_list[0]

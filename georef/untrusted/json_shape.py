@@ -37,7 +37,7 @@ class Nullable:
 
 @dataclass(frozen=True)
 class Values:
-    """An object whose members have one shape, whatever their names."""
+    """An object whose members all have one shape, under any names."""
 
     shape: Any
 

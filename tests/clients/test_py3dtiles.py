@@ -1,4 +1,4 @@
-"""py3dtiles reads the tilesets that are written."""
+"""Tilesets read by py3dtiles."""
 
 from __future__ import annotations
 

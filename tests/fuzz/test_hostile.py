@@ -207,7 +207,7 @@ def test_tilesets_that_name_each_other_without_end(tmp_path: Path) -> None:
         (tmp_path / f"{number}.json").write_text(json.dumps(document))
     (tmp_path / "20.json").write_text(json.dumps({"asset": {"version": "1.1"}, "root": {**volume, "refine": "ADD"}}))
     found = validate(tmp_path / "0.json", external=False)
-    assert any("named more than 20 times" in each.message for each in found)
+    assert any("referred to more than 20 times" in each.message for each in found)
     assert list(read_figures(tmp_path / "0.json")) == []
 
 
@@ -228,7 +228,7 @@ def test_models_that_name_devices_pipes_and_other_peoples_files(tmp_path: Path) 
         with pytest.raises(ExportError, match="not a regular file"):
             inspect(tmp_path / "a.gltf")
     (tmp_path / "c.obj").write_text("".join(f"mtllib {n}.mtl\n" for n in range(100)) + triangle)
-    with pytest.raises(ExportError, match="names 100 files"):
+    with pytest.raises(ExportError, match="refers to 100 files"):
         inspect(tmp_path / "c.obj")
 
 

@@ -170,9 +170,9 @@ def test_egm96_at_the_poles_on_every_meridian():
 @pytest.mark.parametrize("lat", [-77.1, -20.0, 0.0, 12.4, 66.6])
 def test_egm96_is_continuous_over_the_antimeridian(lat):
     assert undulation_m(180.0, lat, "egm96") == undulation_m(-180.0, lat, "egm96")
-    beside = [undulation_m(lon, lat, "egm96") for lon in (179.9999, 180.0, -179.9999)]
+    across = [undulation_m(lon, lat, "egm96") for lon in (179.9999, 180.0, -179.9999)]
     # 1e-4 degrees are 11 m, over which no geoid rises by a centimetre.
-    assert np.ptp(beside) < 0.01
+    assert np.ptp(across) < 0.01
 
 
 def test_egm96_in_zurich_and_at_its_extremes():

@@ -87,7 +87,7 @@ def test_a_sheet_in_degrees_is_stretched(folder: Path) -> None:
     assert spot.up_m == pytest.approx(1114, abs=2)
 
 
-def test_a_mirrored_sheet_is_told(folder: Path) -> None:
+def test_a_mirrored_sheet_is_reported(folder: Path) -> None:
     flipped = matrix() @ np.array([[-1.0, 0, SIZE[0]], [0, 1, 0], [0, 0, 1]])
     spot = read_sheet(given_map(folder, flipped, SWISS)).place(100, 100)
     assert spot.mirrored
@@ -239,14 +239,14 @@ def test_inconsistent_points_are_reported(folder: Path) -> None:
     assert read_sheet(points_file(folder / "map.points", pixels, swiss(pixels))).notes == ()
 
 
-def test_outside_the_hull_is_told_with_its_distance(folder: Path) -> None:
+def test_outside_the_hull_the_distance_is_reported(folder: Path) -> None:
     pixels = np.array([[100.0, 100], [200, 100], [200, 200], [100, 200], [150, 150]])
     sheet = read_sheet(points_file(folder / "map.points", pixels, swiss(pixels)))
     assert sheet.place(150, 120).outside_m == 0.0
     assert sheet.place(150, 120).notes == ()
-    beside = sheet.place(240, 150)
-    assert beside.outside_m == pytest.approx(40 * METRES_PX, rel=1e-3)
-    assert "240 150 lies 200 m outside the control points' hull" in beside.notes[0]
+    outside = sheet.place(240, 150)
+    assert outside.outside_m == pytest.approx(40 * METRES_PX, rel=1e-3)
+    assert "240 150 lies 200 m outside the control points' hull" in outside.notes[0]
     assert sheet.place(230, 240).outside_m == pytest.approx(50 * METRES_PX, rel=1e-3), "from a corner"
 
 

@@ -65,7 +65,7 @@ def test_the_reference_system_may_be_an_option(tmp_path: Path) -> None:
         read_sheet(sheet, map_crs="EPSG:4978")
 
 
-def test_another_system_than_the_file_names_is_told(tmp_path: Path) -> None:
+def test_overriding_the_reference_system_of_the_file_is_reported(tmp_path: Path) -> None:
     picture(tmp_path / "map.png")
     world_file(tmp_path / "map.pgw")
     (tmp_path / "map.prj").write_text(pyproj.CRS("EPSG:21781").to_wkt("WKT1_ESRI"))
@@ -91,7 +91,7 @@ def test_metres_under_the_name_of_degrees_can_be_overridden(tmp_path: Path) -> N
 
 
 def write_geotiff(path: Path, transform: FloatArray | None = None, point: bool = False, **more: object) -> Path:
-    """By GDAL. Its transforms are those of pixels' corners whatever the file says of its pixels."""
+    """Read with GDAL, whose transforms refer to pixel corners in any case."""
     if transform is not None:
         more["transform"] = Affine(*transform.ravel())
     with warnings.catch_warnings():
@@ -201,7 +201,7 @@ def test_points_switched_off_are_left_out(tmp_path: Path) -> None:
     assert sheet.lonlat(PROBE) == pytest.approx(expected(), abs=DEG)
 
 
-def test_points_said_twice_count_once(tmp_path: Path) -> None:
+def test_duplicate_points_count_once(tmp_path: Path) -> None:
     twice = np.concatenate([controls(), controls()[:4]])
     sheet = read_sheet(points_file(tmp_path / "map.points", twice, swiss(twice)), transform="tps")
     assert len(sheet.pixels) == 9

@@ -93,7 +93,7 @@ def test_residuals_and_errors_follow_their_statistics(method: str) -> None:
         mahalanobis += float(error @ np.linalg.solve(covariance, error))
         noisy = found.apply(pixels) - exact
         squares += float((noisy**2).sum())
-    # The fitted part of the noise has p degrees of freedom, what is left over 2n - p: looked at from the fitted side.
+    # The fitted part of the noise has p degrees of freedom, the residuals 2n - p; tested by the fitted part.
     parts = ((squares / sigma**2, draws * clean.parameters), (mahalanobis, draws * 2))
     for value, freedom in parts:
         # One in a million draws of a right fit would be outside; a wrong number of parameters is far outside.

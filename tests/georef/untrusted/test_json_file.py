@@ -41,7 +41,7 @@ def test_brackets_in_texts_are_not_counted(text: str) -> None:
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_are_a_document_or_a_value_error_in_one_line(data: bytes) -> None:
+def test_any_bytes_are_a_document_or_a_one_line_error(data: bytes) -> None:
     message = ""
     try:
         parse_json(data)
@@ -102,6 +102,6 @@ def test_messages_are_one_printable_line(text: str) -> None:
     shown.encode()  # lone surrogates, as in file names that are not Unicode, are gone
 
 
-def test_paths_and_plain_texts_stay_as_they_are() -> None:
+def test_paths_and_plain_texts_are_unchanged() -> None:
     assert one_line("C:\\a  b\\ä.png: 3×4 px") == "C:\\a  b\\ä.png: 3×4 px"
     assert one_line("a\n\tb\x1b[2J") == "a b\ufffd[2J"

@@ -23,7 +23,7 @@ SHAPE = {
         {"items": [{"count": 0, "name": "", "at": [1, 2.5], "scale": -1}, {"count": 2**53}], "scene": 1},
     ],
 )
-def test_what_fits(value: Any) -> None:
+def test_valid_documents(value: Any) -> None:
     check_shape(value, SHAPE)
 
 
@@ -45,7 +45,7 @@ def test_what_fits(value: Any) -> None:
         ({"scene": []}, "/scene is not a non-negative integer"),
     ],
 )
-def test_what_does_not_fit_is_named_by_its_path(value: Any, finding: str) -> None:
+def test_invalid_members_are_named_by_their_path(value: Any, finding: str) -> None:
     with pytest.raises(DamagedFile, match=f"^{finding}$"):
         check_shape(value, SHAPE)
 
