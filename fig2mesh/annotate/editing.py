@@ -21,12 +21,12 @@ from fig2mesh.skeleton import BONES, JOINT_NAMES, LABEL_COLOURS, LIMBS, PART_NAM
 INSIDE = 128
 """This bit of a pixel's byte says that it is in the silhouette; the lower ones are its part label."""
 
-MOST_PIXELS = 40_000_000
+MAX_PIXELS = 40_000_000
 """Browsers do not draw on larger canvases."""
 
 
 @dataclass(frozen=True)
-class Subject:
+class AnnotatedPicture:
     """A drawing that is being annotated.
 
     rgba : (H, W, 4) of the part of the picture that is shown; corner : (x, y) of its corner in the picture
@@ -46,7 +46,7 @@ def begin(
     keypoints: Path | None,
     part_labels: Path | None,
     bbox: tuple[int, int, int, int] | None,
-) -> tuple[Subject, Annotation]:
+) -> tuple[AnnotatedPicture, Annotation]:
     """A drawing and what is known of it, in IMAGE pixels of the part that is shown.
 
     What no file says is inferred from the picture; where no figure is seen in it, it is nothing for a silhouette, and a
@@ -54,9 +54,9 @@ def begin(
     """
     view = read_view(path, bbox)
     height, width = view.rgba.shape[:2]
-    if height * width > MOST_PIXELS:
+    if height * width > MAX_PIXELS:
         raise FigureError(path, f"{width}×{height} px is too much for a page", "pass --bbox round the figure")
-    subject = Subject(path.stem, path.name, view.rgba, view.corner, view.size)
+    subject = AnnotatedPicture(path.stem, path.name, view.rgba, view.corner, view.size)
     silhouette = read_mask(mask, view)
     labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, view)
     given = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
@@ -88,7 +88,7 @@ def standing(mask: BoolArray) -> FloatArray:
     return np.clip(np.array(joints, np.float32), 0, limit)
 
 
-def packed(subject: Subject, annotation: Annotation) -> bytes:
+def packed(subject: AnnotatedPicture, annotation: Annotation) -> bytes:
     """What the page starts with: head and pixels, see `unpacked`, and in the head what it must know besides."""
     height, width = annotation.mask.shape
     rows = zip(JOINT_NAMES, annotation.joints_px.astype(float).tolist(), annotation.visible.tolist(), strict=True)
@@ -108,7 +108,7 @@ def packed(subject: Subject, annotation: Annotation) -> bytes:
     return struct.pack("<I", len(text)) + text + pixels.tobytes()
 
 
-def unpacked(message: bytes, subject: Subject) -> Annotation:
+def unpacked(message: bytes, subject: AnnotatedPicture) -> Annotation:
     """The annotation that a page sends: 4 bytes with the length of the head, little-endian, the head in JSON, and a
     byte for each pixel, row by row: `INSIDE` and the part label.
 

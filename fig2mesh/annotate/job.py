@@ -7,7 +7,7 @@ import logging
 import shlex
 from pathlib import Path
 
-from fig2mesh.annotate.editing import Subject, begin
+from fig2mesh.annotate.editing import AnnotatedPicture, begin
 from fig2mesh.annotate.request import AnnotateRequest
 from fig2mesh.annotate.server import annotation_server
 from fig2mesh.errors import FigureError, OutputError
@@ -49,14 +49,14 @@ def run(request: AnnotateRequest) -> None:
     show(annotation_server(page(subject), subject, start, save, preview, request.port), request.open)
 
 
-def page(subject: Subject) -> str:
+def page(subject: AnnotatedPicture) -> str:
     """The page of a drawing; picture and annotation it asks the server for."""
     scripts = "\n".join(asset(f"{name}.js", PACKAGE) for name in ("document", "canvas", "page"))
     values = {"title": html.escape(subject.name), "style": asset("page.css", PACKAGE), "scripts": scripts}
     return filled("page.html", values, PACKAGE)
 
 
-def preview_page(subject: Subject, annotation: Annotation, parts: Parts) -> str:
+def preview_page(subject: AnnotatedPicture, annotation: Annotation, parts: Parts) -> str:
     """The page that shows the solid, of draft quality. Raises FigureError where there is none."""
     if not annotation.mask.any():
         raise FigureError(subject.picture, "the silhouette is empty", "paint it first")

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from PIL import Image
 
-from fig2mesh.annotate.editing import Subject, packed, unpacked
+from fig2mesh.annotate.editing import AnnotatedPicture, packed, unpacked
 from fig2mesh.errors import InputError
 from fig2mesh.parse.annotation import Annotation
 
@@ -37,7 +37,7 @@ class _State:
 
 def annotation_server(
     page: str,
-    subject: Subject,
+    subject: AnnotatedPicture,
     start: Annotation,
     save: Callable[[Annotation], str],
     preview: Callable[[Annotation], str],
@@ -56,7 +56,7 @@ def annotation_server(
     working = threading.Lock()
     state = _State(start)
 
-    class Handler(BaseHTTPRequestHandler):
+    class AnnotationHandler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             if not self._is_for_us():
                 return
@@ -121,7 +121,7 @@ def annotation_server(
             """Nothing: the terminal shows the address and what was saved."""
 
     try:
-        server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        server = ThreadingHTTPServer(("127.0.0.1", port), AnnotationHandler)
     except OSError as error:
         remedy = "choose another one, or leave it out"
         raise InputError("--port", f"{port} cannot be used ({error.strerror})", remedy) from None

@@ -16,10 +16,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from fig2mesh.batch.engine import Stage, lost
+from fig2mesh.batch.engine import StageNotice, lost
 from fig2mesh.batch.ledger import WORK
 from fig2mesh.batch.row_job import check_row, convert_row
-from fig2mesh.batch.task import Batch, Outcome, Task
+from fig2mesh.batch.task import Batch, Outcome, RowTask
 from fig2mesh.errors import InputError
 
 TOPIC: Final = "fig2mesh"
@@ -33,7 +33,7 @@ ANSWER_S: Final = 10.0
 WORKERS_S: Final = 60.0
 """How long to wait for the first worker."""
 
-LOOK_S: Final = 5.0
+POLL_S: Final = 5.0
 """How often to look whether the scheduler is still there."""
 
 _one_at_a_time = threading.Lock()
@@ -119,13 +119,13 @@ class DaskEngine:
         """Threads of all workers."""
         return self._threads
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
+    def run(self, tasks: Iterable[RowTask]) -> Iterator[Outcome | StageNotice]:
         """See `Engine.run`; stages are told by the scheduler's events."""
         # Of Dask's futures that have ended, and of stages.
         notices: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._client.subscribe_topic(TOPIC, lambda event: notices.put(Stage(*event[1])))
+        self._client.subscribe_topic(TOPIC, lambda event: notices.put(StageNotice(*event[1])))
         waiting = iter(tasks)
-        given: dict[str, tuple[Task, Any]] = {}
+        given: dict[str, tuple[RowTask, Any]] = {}
 
         def give() -> None:
             for task in itertools.islice(waiting, AHEAD * max(self._threads, 1) - len(given)):
@@ -137,12 +137,12 @@ class DaskEngine:
             give()
             while given:
                 try:
-                    notice = notices.get(timeout=LOOK_S)
+                    notice = notices.get(timeout=POLL_S)
                 except queue.Empty:
                     if self._client.status != "running":
                         raise OSError(f"the connection is {self._client.status}") from None
                     continue
-                if isinstance(notice, Stage):
+                if isinstance(notice, StageNotice):
                     yield notice
                     continue
                 task, future = given.pop(notice.key)
@@ -162,12 +162,12 @@ class DaskEngine:
                 self._client.unsubscribe_topic(TOPIC)
             self._client.close()
 
-    def _submit(self, task: Task) -> Any:
+    def _submit(self, task: RowTask) -> Any:
         key = f"fig2mesh-{task.number}-{secrets.token_hex(4)}"
         # Lower numbers first; a row whose worker is lost comes again before those that were never begun.
         return self._client.submit(_row, self._batch, task, self._dry, key=key, pure=False, priority=-task.number)
 
-    def _outcome(self, future: Any, task: Task) -> Outcome:
+    def _outcome(self, future: Any, task: RowTask) -> Outcome:
         if future.status == "finished":
             found = future.result()
             assert isinstance(found, Outcome)
@@ -188,7 +188,7 @@ def _facts(mark: str, dask_worker: Any) -> Facts:
     return Facts(fingerprint(), os.path.exists(mark), dask_worker.state.nthreads)
 
 
-def _row(batch: Batch, task: Task, dry: bool) -> Outcome:
+def _row(batch: Batch, task: RowTask, dry: bool) -> Outcome:
     """One row in a worker of the cluster."""
     from distributed import get_worker
 

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
-from fig2mesh.batch.task import Outcome, Task
+from fig2mesh.batch.task import Outcome, RowTask
 
 
 @dataclass(frozen=True)
-class Stage:
+class StageNotice:
     """Notice of a worker that a row is at a stage."""
 
     worker: str
@@ -19,9 +19,9 @@ class Stage:
     stage: str
 
 
-def lost(task: Task, how: str) -> Outcome:
+def lost(task: RowTask, how: str) -> Outcome:
     """The outcome of a row that no worker could tell itself."""
-    return Outcome(task.number, task.name, "failed", how, ours=True, lost=True)
+    return Outcome(task.number, task.name, "failed", how, internal=True, lost=True)
 
 
 class Engine(Protocol):
@@ -32,7 +32,7 @@ class Engine(Protocol):
         """How many rows are worked on at a time."""
         ...
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
+    def run(self, tasks: Iterable[RowTask]) -> Iterator[Outcome | StageNotice]:
         """Run all tasks and yield how each went, in the order in which they end, with notices in between.
 
         Tasks are taken from the iterable as workers are free, and no more are held than a few for each: memory does not

@@ -16,13 +16,13 @@ from exporters.gis.time_span import time_span
 from exporters.tiles.tileset import too_near_note
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column
-from fig2mesh.batch.engine import Engine, Stage
+from fig2mesh.batch.engine import Engine, StageNotice
 from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.local_engine import LocalEngine
 from fig2mesh.batch.progress import Tally, watching
 from fig2mesh.batch.request import BatchRequest
 from fig2mesh.batch.row_files import Roots
-from fig2mesh.batch.row_job import LASTING
+from fig2mesh.batch.row_job import FOLDER_KEYS
 from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apart
 from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, check_formats, read_spool, tasks_of, write_spool
@@ -52,12 +52,12 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
             count, unknown = write_spool(tasks_of(read_rows(request.collection, request.layer), defaults), partial)
         if count == 0:
             raise InputError(request.collection, "has no rows", "give one row for each figure")
-        _tell_unknown(unknown)
+        _log_unknown(unknown)
         tally = Tally(count)
         engine = _engine(request, batch, count)
         with watching(request.progress, tally, bool(verbose), quiet) as watchers:
             for notice in engine.run(read_spool(spool)):
-                if isinstance(notice, Stage):
+                if isinstance(notice, StageNotice):
                     for watcher in watchers:
                         watcher.stage(notice)
                     continue
@@ -73,10 +73,10 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
         else:
             title = request.title or request.collection.stem
             summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
-            _tell(folder, tally, summary)
+            _log_summary(folder, tally, summary)
             if summary.figures and (note := too_near_note(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)
-        return 0 if not tally.failed else 1 if tally.ours else 2
+        return 0 if not tally.failed else 1 if tally.internal else 2
 
 
 def _engine(request: BatchRequest, batch: Batch, count: int) -> Engine:
@@ -128,7 +128,7 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
         raise OutputError(output, "another batch is writing there", "wait for it, or choose another -o DIR") from None
 
 
-def _tell_unknown(unknown: dict[str, int]) -> None:
+def _log_unknown(unknown: dict[str, int]) -> None:
     """Say which columns are no options; one that is nearly called like an option may be a slip."""
     if not unknown:
         return
@@ -145,11 +145,11 @@ def _keep_failure(folder: Path, outcome: Outcome) -> None:
     """Record a row that its worker could not record itself."""
     ledger = Ledger(folder)
     before = ledger.read(outcome.name) or {}
-    kept: dict[str, Any] = {name: before[name] for name in LASTING if name in before}
+    kept: dict[str, Any] = {name: before[name] for name in FOLDER_KEYS if name in before}
     ledger.write(outcome.name, {**kept, "status": "failed", "error": outcome.error, "ours": True})
 
 
-def _tell(folder: Path, tally: Tally, summary: Summary) -> None:
+def _log_summary(folder: Path, tally: Tally, summary: Summary) -> None:
     log.info(
         "%s: %d figures: %d converted, %d unchanged, %d failed; %d on the globe",
         folder,

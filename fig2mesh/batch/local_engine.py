@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Final
 
-from fig2mesh.batch.engine import Stage, lost
+from fig2mesh.batch.engine import StageNotice, lost
 from fig2mesh.batch.row_job import check_row, convert_row
-from fig2mesh.batch.task import Batch, Outcome, Task
+from fig2mesh.batch.task import Batch, Outcome, RowTask
 
 # fmt: off
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
@@ -33,7 +33,7 @@ PARENT_S: Final = 1.0
 class _Worker:
     process: Any
     pipe: Connection
-    task: Task | None = None
+    task: RowTask | None = None
     since: float = 0.0
 
 
@@ -48,10 +48,10 @@ class LocalEngine:
         """Number of processes."""
         return self._jobs
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
+    def run(self, tasks: Iterable[RowTask]) -> Iterator[Outcome | StageNotice]:
         """See `Engine.run`."""
         queue = iter(tasks)
-        again: list[Task] = []
+        again: list[RowTask] = []
         deaths: dict[int, int] = {}
         workers: list[_Worker] = []
 
@@ -96,7 +96,7 @@ class LocalEngine:
                         give(worker)
                         yield message
                     else:
-                        yield Stage(str(worker.process.pid), task.number, task.name, message)
+                        yield StageNotice(str(worker.process.pid), task.number, task.name, message)
                 for worker in busy.values():  # those that have said nothing
                     if worker.task is not None and time.monotonic() - worker.since > self._timeout_s:
                         task = worker.task
@@ -133,7 +133,7 @@ class LocalEngine:
         return int(worker.process.exitcode or 0)
 
 
-def _died(task: Task, code: int) -> Outcome:
+def _died(task: RowTask, code: int) -> Outcome:
     how = f"signal {-code}" if code < 0 else f"exit code {code}"
     hint = "; it may have run out of memory: try fewer --jobs" if code == -signal.SIGKILL else ""
     return lost(task, f"its worker ended with {how}, {TRIES} times{hint}")

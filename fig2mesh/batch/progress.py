@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, Protocol, TextIO
 
-from fig2mesh.batch.engine import Stage
+from fig2mesh.batch.engine import StageNotice
 from fig2mesh.batch.task import Outcome
 
 log = logging.getLogger("fig2mesh")
@@ -31,7 +31,7 @@ RECENT: Final = 200
 class Watcher(Protocol):
     """Is told of everything."""
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """A worker begins a stage."""
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
@@ -47,7 +47,7 @@ class Tally:
     converted: int = 0
     unchanged: int = 0
     failed: int = 0
-    ours: int = 0
+    internal: int = 0
     stages: dict[str, int] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     start: float = field(default_factory=time.monotonic)
@@ -62,7 +62,7 @@ class Tally:
         """Count a row. What was unchanged counts so, failed or not."""
         if outcome.status == "failed":
             self.failed += 1
-            self.ours += outcome.ours
+            self.internal += outcome.internal
         elif outcome.unchanged:
             self.unchanged += 1
         else:
@@ -107,19 +107,19 @@ class Events:
     def __init__(self, stream: TextIO) -> None:
         self._stream, self._start = stream, time.monotonic()
 
-    def say(self, event: str, **facts: Any) -> None:
+    def emit(self, event: str, **facts: Any) -> None:
         """Write an event at once."""
         line = {"event": event, "t": round(time.monotonic() - self._start, 3), **facts}
         self._stream.write(json.dumps(line, ensure_ascii=False) + "\n")
         self._stream.flush()
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """A worker begins a stage."""
-        self.say("stage", worker=notice.worker, row=notice.number, name=notice.name, stage=notice.stage)
+        self.emit("stage", worker=notice.worker, row=notice.number, name=notice.name, stage=notice.stage)
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
         """A row has ended."""
-        self.say(
+        self.emit(
             "row",
             row=outcome.number,
             name=outcome.name,
@@ -136,7 +136,7 @@ class Events:
 class Lines:
     """Failed rows as they fail, on stderr."""
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """Nothing is said."""
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
@@ -156,9 +156,9 @@ class Workers:
     """What each worker does, for who asks: with -v below the bar, and on the signal USR1."""
 
     def __init__(self) -> None:
-        self.now: dict[str, tuple[Stage, float]] = {}
+        self.now: dict[str, tuple[StageNotice, float]] = {}
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """A worker begins a stage."""
         self.now[notice.worker] = (notice, time.monotonic())
 
@@ -184,9 +184,9 @@ def watching(kind: Kind, tally: Tally, verbose: bool, quiet: bool) -> Iterator[l
     with _on_signal(tally, workers):
         if kind == "json":
             events = Events(sys.stdout)
-            events.say("start", progress=tally.as_dict())
+            events.emit("start", progress=tally.as_dict())
             yield [*watchers, events]
-            events.say("end", progress=tally.as_dict(), stages=tally.stages, counts=tally.counts)
+            events.emit("end", progress=tally.as_dict(), stages=tally.stages, counts=tally.counts)
             return
         if kind == "none" or (kind == "auto" and (quiet or not sys.stderr.isatty())):
             yield watchers
@@ -235,7 +235,7 @@ def _bar(tally: Tally, workers: Workers | None) -> Iterator[Watcher]:
     live = Live(console=Console(stderr=True), transient=True, refresh_per_second=4, get_renderable=shown)
 
     class Bar:
-        def stage(self, notice: Stage) -> None:
+        def stage(self, notice: StageNotice) -> None:
             """The lines of the workers are made when they are shown."""
 
         def row(self, outcome: Outcome, tally: Tally) -> None:

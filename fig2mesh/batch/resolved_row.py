@@ -8,8 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.batch.row_files import digest_of, input_files, resolve, sheet_files, stand
-from fig2mesh.batch.task import Batch, Task
+from fig2mesh.batch.row_files import digest_of, files_unchanged, input_files, resolve, sheet_files
+from fig2mesh.batch.task import Batch, RowTask
 from fig2mesh.conversion.request import PlaceRequest, Request
 from fig2mesh.errors import InputError
 
@@ -28,7 +28,7 @@ class ResolvedRow:
     Raises InputError naming the column.
     """
 
-    def __init__(self, batch: Batch, task: Task) -> None:
+    def __init__(self, batch: Batch, task: RowTask) -> None:
         from exporters.gis.time_span import time_span
         from fig2mesh.conversion.keys import key_of
 
@@ -40,15 +40,15 @@ class ResolvedRow:
             time_span(task.date, "column date")
         resolved = resolve(task.request, batch.roots, task.own_files)
         self.request: Request = replace(resolved, outputs=self.targets)
-        if not (resolved.somewhere or batch.unplaced):
+        if not (resolved.has_place or batch.unplaced):
             raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or pass --unplaced")
         files = input_files(resolved)
         self.inputs: dict[str, str] = {
-            self._seen(file): digest_of(file) for name in sorted(files) for file in files[name]
+            self._relative(file): digest_of(file) for name in sorted(files) for file in files[name]
         }
         values = {each.name: getattr(resolved, each.name) for each in fields(resolved)}
         self.key = key_of(
-            options={name: self._seen(v) if isinstance(v, Path) else str(v) for name, v in values.items()},
+            options={name: self._relative(v) if isinstance(v, Path) else str(v) for name, v in values.items()},
             formats=task.formats,
             date=task.date,
             inputs=self.inputs,
@@ -56,7 +56,7 @@ class ResolvedRow:
             title=task.title,
         )
 
-    def _seen(self, file: Path) -> str:
+    def _relative(self, file: Path) -> str:
         real, root = Path(os.path.realpath(file)), self.batch.roots.root
         return (real.relative_to(root) if real.is_relative_to(root) else real).as_posix()
 
@@ -75,11 +75,11 @@ class ResolvedRow:
         suffixes = dict.fromkeys(("glb", *(each.lower().lstrip(".") for each in self.task.formats)))
         return tuple(f"{self.task.name}.{suffix}" for suffix in suffixes)
 
-    def stands(self, record: dict[str, Any]) -> bool:
+    def is_current(self, record: dict[str, Any]) -> bool:
         """Whether a record of the same key says how this ends: its outputs are there, or its failure is lasting."""
         if record["status"] == "failed":
             return bool(record.get("lasting"))
-        return record["status"] == "done" and stand(self.batch.folder, record["outputs"])
+        return record["status"] == "done" and files_unchanged(self.batch.folder, record["outputs"])
 
     def profile(self) -> Profile:
         """What the client of the outputs takes. Raises InputError where it does not read them."""
@@ -90,7 +90,7 @@ class ResolvedRow:
         profile.check_tools()
         for target in self.targets:
             profile.check(target, Path(target).suffix.lower())
-            if needs_place(target) and not self.request.somewhere:
+            if needs_place(target) and not self.request.has_place:
                 raise InputError("column format", f"{target} needs a place on earth", "give lon and lat")
         return profile
 

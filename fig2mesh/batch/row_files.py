@@ -103,7 +103,7 @@ def _digest(path: Path, size: int, changed_ns: int, inode: int) -> str:
     return sha256_of(path)
 
 
-def stand(folder: Path, files: dict[str, str]) -> bool:
+def files_unchanged(folder: Path, files: dict[str, str]) -> bool:
     """Whether files are there as they were left. files : path seen from the folder → digest"""
     try:
         return all(digest_of(folder / name) == digest for name, digest in files.items())

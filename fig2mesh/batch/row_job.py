@@ -15,7 +15,7 @@ from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
 from fig2mesh.batch.resolved_row import ResolvedRow
 from fig2mesh.batch.row_files import digest_of
-from fig2mesh.batch.task import Batch, Outcome, Task
+from fig2mesh.batch.task import Batch, Outcome, RowTask
 from fig2mesh.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -35,24 +35,24 @@ UNKNOWN_DATE = "0001/9999"
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
-LASTING = ("claimed", "files")
+FOLDER_KEYS = ("claimed", "files")
 """What a record says of the folder, whatever becomes of the row: whether a batch has begun it, files that are ours."""
 
 Advance = Callable[[str], object]
 
 
-def check_row(batch: Batch, task: Task) -> Outcome:
+def check_row(batch: Batch, task: RowTask) -> Outcome:
     """Read everything that a row names, and say what is wrong; nothing is written, no network runs."""
     try:
         ResolvedRow(batch, task).check()
     except InputError as error:
         return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
     except Exception as error:
-        return Outcome(task.number, task.name, "failed", _line(error), ours=True)
+        return Outcome(task.number, task.name, "failed", _line(error), internal=True)
     return Outcome(task.number, task.name, "done")
 
 
-def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None) -> Outcome:
+def convert_row(batch: Batch, task: RowTask, advance: Advance = lambda stage: None) -> Outcome:
     """Convert a row, unless its outputs are there and of the same input; nothing that goes wrong is raised.
 
     advance : told the name of each stage before it runs
@@ -60,13 +60,16 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
     ledger = Ledger(batch.folder)
     start = time.perf_counter()
     before = ledger.read(task.name)
-    record: dict[str, Any] = {"status": BEGUN, **{name: before[name] for name in LASTING if before and name in before}}
+    record: dict[str, Any] = {
+        "status": BEGUN,
+        **{name: before[name] for name in FOLDER_KEYS if before and name in before},
+    }
     fault: BaseException | None = None
     try:
         try:
             row = ResolvedRow(batch, task)
             record["key"] = row.key
-            if not batch.fresh and before is not None and before.get("key") == row.key and row.stands(before):
+            if not batch.fresh and before is not None and before.get("key") == row.key and row.is_current(before):
                 return _outcome(task, before, unchanged=True)
             row.check_values()
             _claim(batch, task, ledger, record)
@@ -94,14 +97,14 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
     return _outcome(task, record)
 
 
-def _outcome(task: Task, record: dict[str, Any], unchanged: bool = False) -> Outcome:
+def _outcome(task: RowTask, record: dict[str, Any], unchanged: bool = False) -> Outcome:
     work = record.get("work", {}) if not unchanged else {}
     return Outcome(
         number=task.number,
         name=task.name,
         status=record["status"],
         error=record.get("error"),
-        ours=record.get("ours", False),
+        internal=record.get("ours", False),
         full=record.get("full", False),
         unchanged=unchanged,
         seconds=record.get("seconds", 0.0),
@@ -125,7 +128,7 @@ def _line(error: Exception) -> str:
     return " ".join(without_temporary(str(error)).split())[:500] or type(error).__name__
 
 
-def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> None:
+def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) -> None:
     """Note that the folder of a figure is ours from now on, and clear away what a worker that died has left there."""
     target = batch.folder / task.name
     if target.is_symlink():

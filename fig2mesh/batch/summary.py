@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from fig2mesh.batch.ledger import WORK, Ledger
-from fig2mesh.batch.row_files import digest_of, stand
-from fig2mesh.batch.task import Task
+from fig2mesh.batch.row_files import digest_of, files_unchanged
+from fig2mesh.batch.task import RowTask
 from fig2mesh.batch.tasks import read_spool
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
@@ -84,7 +84,7 @@ def summarise(collection: Collection) -> Summary:
     tallest_m = max((figure.placement.figure_height_m for figure in figures), default=0.0)
     counts = (len(figures), tallest_m, unplaced, failed)
     before = _before(folder)
-    if before["digest"] == digest.hexdigest() and stand(folder, before["files"]):
+    if before["digest"] == digest.hexdigest() and files_unchanged(folder, before["files"]):
         return Summary(*counts, (), tuple(sorted(left)))
     from exporters.atomic_file import write_text, write_whole
 
@@ -129,7 +129,7 @@ def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Se
     write_stac(items(), stage, id=identifier, title=collection.title, files=over)
 
 
-def _records(collection: Collection) -> Iterator[tuple[Task, dict[str, Any]]]:
+def _records(collection: Collection) -> Iterator[tuple[RowTask, dict[str, Any]]]:
     ledger = Ledger(collection.folder)
     for task in read_spool(collection.spool):
         record = ledger.read(task.name) or {}
@@ -144,7 +144,7 @@ def _failures(collection: Collection) -> Iterable[tuple[int, str, str]]:
             yield task.number, task.name, str(record.get("error"))
 
 
-def _line(task: Task, record: dict[str, Any]) -> dict[str, Any]:
+def _line(task: RowTask, record: dict[str, Any]) -> dict[str, Any]:
     """A row of the manifest."""
     facts = {"row": task.number, "where": task.where, "name": task.name, "title": task.title}
     done = record["status"] == "done"

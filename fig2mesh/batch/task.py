@@ -38,7 +38,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Task:
+class RowTask:
     """A row of a collection, ready to be converted.
 
     number, where : as in `Row`; name : of its folder; title : for people
@@ -73,7 +73,7 @@ class Outcome:
     name: str
     status: str
     error: str | None = None
-    ours: bool = False
+    internal: bool = False
     lost: bool = False
     full: bool = False
     unchanged: bool = False

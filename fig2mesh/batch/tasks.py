@@ -14,7 +14,7 @@ from exporters.tiles.tileset import safe_name
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.columns import attributes_of, list_of, request_of
 from fig2mesh.batch.row_files import FILE_FIELDS
-from fig2mesh.batch.task import Problem, Task
+from fig2mesh.batch.task import Problem, RowTask
 from fig2mesh.conversion.fields import as_plain
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
@@ -22,7 +22,7 @@ from fig2mesh.errors import InputError
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
 """What a row may ask for; .glb is always made."""
 
-LONGEST_NAME: Final = 60
+MAX_NAME: Final = 60
 """Characters of a folder's name; file systems allow 255 bytes, and a character takes up to four."""
 
 TAKEN: Final = ("tileset.json", "index.geojson", "index.gpkg", "figures.czml", "collection.json", "manifest.jsonl")
@@ -51,7 +51,7 @@ class Names:
         self._table.close()
 
 
-def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> Iterator[Task]:
+def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> Iterator[RowTask]:
     """Rows with names: the one that a row gives, else the stem of its picture, with a number where that is taken.
 
     defaults : options for rows that have none, by column
@@ -61,14 +61,14 @@ def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> 
             yield _task(row, names, defaults or {})
 
 
-def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> Task:
+def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     values = row.values
     problem = None if row.problem is None else _problem(row.where, row.problem)
     given = values.get("name")
     title = (
         str(given) if given is not None else PurePosixPath(str(values.get("figure", ""))).stem or f"row {row.number}"
     )
-    wanted = safe_name(title)[:LONGEST_NAME].strip(".") or "figure"
+    wanted = safe_name(title)[:MAX_NAME].strip(".") or "figure"
     name, number = wanted, 1
     while (other := names.take(name, row.number)) is not None:
         if given is not None and problem is None:
@@ -79,7 +79,7 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> Task:
     return make_task(row, name, title, defaults, problem)
 
 
-def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> Task:
+def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> RowTask:
     """The task of a row; problem : what is known to be wrong with it already."""
     values = row.values
     formats = list_of(values.get("format", defaults.get("format", ())))
@@ -91,7 +91,7 @@ def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], prob
             check_formats(formats, "column format")
         except InputError as error:
             request, problem = None, Problem(error.source, error.finding, error.remedy)
-    return Task(
+    return RowTask(
         row.number,
         row.where,
         name,
@@ -117,7 +117,7 @@ def _problem(where: str, text: str) -> Problem:
     return Problem(where, finding, remedy or "correct the row")
 
 
-def write_spool(tasks: Iterable[Task], path: Path) -> tuple[int, dict[str, int]]:
+def write_spool(tasks: Iterable[RowTask], path: Path) -> tuple[int, dict[str, int]]:
     """Write tasks to a file, one a line; returns their number, and in how many rows each attribute has a value."""
     count = 0
     unknown: dict[str, int] = {}
@@ -131,14 +131,14 @@ def write_spool(tasks: Iterable[Task], path: Path) -> tuple[int, dict[str, int]]
     return count, unknown
 
 
-def read_spool(path: Path) -> Iterator[Task]:
+def read_spool(path: Path) -> Iterator[RowTask]:
     """The tasks in a file."""
     with path.open(encoding="utf-8") as stream:
         for line in stream:
             yield _task_from(json.loads(line))
 
 
-def _plain(task: Task) -> dict[str, Any]:
+def _plain(task: RowTask) -> dict[str, Any]:
     fields = {each.name: getattr(task, each.name) for each in dataclasses.fields(task)}
     return fields | {
         "request": None if task.request is None else as_plain(task.request),
@@ -146,9 +146,9 @@ def _plain(task: Task) -> dict[str, Any]:
     }
 
 
-def _task_from(fields: dict[str, Any]) -> Task:
+def _task_from(fields: dict[str, Any]) -> RowTask:
     request, problem = fields["request"], fields["problem"]
-    return Task(
+    return RowTask(
         **fields
         | {
             "request": None if request is None else Request(**request),

@@ -149,7 +149,7 @@ def convert(
     del drawn, figure  # four bytes a pixel of what may be a whole sheet
     start = time.perf_counter()
     placed = place(request, sheet, cleaned.figure, request.figure)
-    if request.somewhere:
+    if request.has_place:
         why = "at --map" if request.map is not None else "at --lonlat"
         observer.note("place", why, placing_s + time.perf_counter() - start)
     runner = Runner(settings, store=store or NoStore(), observer=observer)

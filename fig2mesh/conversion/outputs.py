@@ -21,7 +21,7 @@ def check_request(request: Request) -> None:
     client = profile_named(request.profile)
     client.check_tools()
     for target in request.targets:
-        if not request.somewhere:
+        if not request.has_place:
             refuse_unplaced(target)
     check_outputs(
         request.targets,

@@ -104,7 +104,7 @@ class PlaceRequest:
     )
 
     @property
-    def somewhere(self) -> bool:
+    def has_place(self) -> bool:
         """Whether a place is asked for."""
         return self.lonlat is not None or self.map is not None
 

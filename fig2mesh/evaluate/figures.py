@@ -17,7 +17,7 @@ from fig2mesh.conversion.convert import run_stages
 from fig2mesh.errors import InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.measure.bleed import bleed_share
-from fig2mesh.measure.front import flange_share, gap, look, wall_share
+from fig2mesh.measure.front import flange_share, front_view, gap, wall_share
 from fig2mesh.measure.model import front_similarity, silhouette_iou
 from fig2mesh.measure.solid import laws, quality, thinnest_wall
 from fig2mesh.mesh.simplify import deviation
@@ -34,7 +34,7 @@ LEVELS = 3
 COARSE = 5000
 """Triangles of a further level, the same for every quality: what a map with hundreds of figures can afford."""
 
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 Facts = dict[str, float | int | bool]
 
 
@@ -53,7 +53,7 @@ class Drawing:
 
 
 @dataclass(frozen=True)
-class Row:
+class FigureRow:
     """What came of one drawing: facts by the keys of `COLUMNS`, or the one line that says why there are none."""
 
     name: str
@@ -69,25 +69,25 @@ class Column:
     title: str
     form: str = ".2f"
     factor: float = 1.0
-    worse: Literal["least", "greatest"] = "greatest"
+    worse: Literal["min", "max"] = "max"
 
 
 COLUMNS = (
-    Column("silhouette_iou", "IoU %", ".1f", 100, "least"),
-    Column("front_psnr_db", "PSNR dB", ".1f", 1, "least"),
-    Column("front_ssim", "SSIM", ".3f", 1, "least"),
+    Column("silhouette_iou", "IoU %", ".1f", 100, "min"),
+    Column("front_psnr_db", "PSNR dB", ".1f", 1, "min"),
+    Column("front_ssim", "SSIM", ".3f", 1, "min"),
     Column("bleed_share", "bleed %", ".2f", 100),
     Column("gap_share", "gap %", ".2f", 100),
     Column("gap_radius_mm", "gap mm", ".1f"),
     Column("flange_share", "flange %", ".2f", 100),
     Column("wall_share", "wall %", ".1f", 100),
-    Column("thinnest_mm", "thinnest mm", ".2f", 1, "least"),
-    Column("thinnest_quantile_mm", "thinnest 0.1 % mm", ".1f", 1, "least"),
-    Column("quality_least", "q least", ".3f", 1, "least"),
-    Column("quality_quantile", "q 1 %", ".2f", 1, "least"),
+    Column("thinnest_mm", "thinnest mm", ".2f", 1, "min"),
+    Column("thinnest_quantile_mm", "thinnest 0.1 % mm", ".1f", 1, "min"),
+    Column("quality_least", "q least", ".3f", 1, "min"),
+    Column("quality_quantile", "q 1 %", ".2f", 1, "min"),
     Column("slivers", "q < 0.05 %", ".3f", 100),
-    Column("closed", "closed", "yes", 1, "least"),
-    Column("manifold", "manifold", "yes", 1, "least"),
+    Column("closed", "closed", "yes", 1, "min"),
+    Column("manifold", "manifold", "yes", 1, "min"),
     Column("components", "pieces", "d"),
     Column("pieces_drawn", "drawn", "d"),
     Column("genus", "genus", "d"),
@@ -125,17 +125,19 @@ def drawing_in(folder: Path) -> Drawing:
     return Drawing(folder.name, folder / "image.png", folder / "keypoints.json", mask if mask.exists() else None)
 
 
-def evaluate_figures(drawings: tuple[Drawing, ...], settings: Settings, say: Say = lambda line: None) -> list[Row]:
+def evaluate_figures(
+    drawings: tuple[Drawing, ...], settings: Settings, log: Log = lambda line: None
+) -> list[FigureRow]:
     """Make and measure a model of each drawing; what fails is told in its row and the others go on."""
     rows = []
     for number, drawing in enumerate(drawings, 1):
-        say(f"{number} of {len(drawings)}: {drawing.name}")
+        log(f"{number} of {len(drawings)}: {drawing.name}")
         try:
-            rows.append(Row(drawing.name, measure_drawing(drawing, settings)))
+            rows.append(FigureRow(drawing.name, measure_drawing(drawing, settings)))
         except InputError as error:
-            rows.append(Row(drawing.name, {}, " ".join(str(error).split())))
+            rows.append(FigureRow(drawing.name, {}, " ".join(str(error).split())))
         except Exception as error:  # Whatever breaks one figure is a finding about that figure.
-            rows.append(Row(drawing.name, {}, f"{type(error).__name__}: {' '.join(str(error).split())}"))
+            rows.append(FigureRow(drawing.name, {}, f"{type(error).__name__}: {' '.join(str(error).split())}"))
     return rows
 
 
@@ -153,7 +155,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     pixel, origin_px = on_drawing(frame, asset)
     similar = front_similarity(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     missing = gap(finest, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    front, wall, shape, law = look(finest), thinnest_wall(finest), quality(finest), laws(finest)
+    front, wall, shape, law = front_view(finest), thinnest_wall(finest), quality(finest), laws(finest)
     # FIGURE units are metres at this height.
     deviations = [level.deviation_m for level in levels] + [deviation(simplify_mesh(mesh, COARSE), mesh)]
     names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
@@ -166,9 +168,9 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
         "gap_radius_mm": missing.radius_mm,
         "flange_share": flange_share(front),
         "wall_share": wall_share(front),
-        "thinnest_mm": wall.least_mm,
+        "thinnest_mm": wall.min_mm,
         "thinnest_quantile_mm": wall.quantile_mm,
-        "quality_least": shape.least,
+        "quality_least": shape.minimum,
         "quality_quantile": shape.quantile,
         "slivers": shape.slivers,
         "closed": law.closed,
@@ -184,7 +186,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     }
 
 
-def summary(rows: list[Row]) -> tuple[Facts, Facts]:
+def summary(rows: list[FigureRow]) -> tuple[Facts, Facts]:
     """Median and worst of each measure over the figures that have one; for counts and laws too."""
     median: Facts = {}
     worst: Facts = {}
@@ -194,11 +196,11 @@ def summary(rows: list[Row]) -> tuple[Facts, Facts]:
             median[column.key] = (
                 statistics.median_low(values) if column.form in ("d", "yes") else statistics.median(values)
             )
-            worst[column.key] = min(values) if column.worse == "least" else max(values)
+            worst[column.key] = min(values) if column.worse == "min" else max(values)
     return median, worst
 
 
-def as_markdown(rows: list[Row]) -> str:
+def as_markdown(rows: list[FigureRow]) -> str:
     """A table with a line for each figure, then median and worst; figures without a model have their reason."""
     lines = [
         "| figure | " + " | ".join(column.title for column in COLUMNS) + " |",
@@ -215,7 +217,7 @@ def as_markdown(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_json(rows: list[Row]) -> str:
+def as_json(rows: list[FigureRow]) -> str:
     """The same facts unrounded: lengths in mm, shares as fractions."""
     median, worst = summary(rows)
     figures: dict[str, Any] = {row.name: row.facts or {"failure": row.failure} for row in rows}

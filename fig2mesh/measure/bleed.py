@@ -62,8 +62,8 @@ def bleed_share(
     inner = inner if inner.any() else inside
     colour = front[rim][:, :3].astype(np.float32)
     ground = picture[_nearest(outer, rim)]
-    own = _least_distance(colour, picture, inner, rim)
-    apart = _least_distance(ground, picture, inner, rim) > APART
+    own = _min_distance(colour, picture, inner, rim)
+    apart = _min_distance(ground, picture, inner, rim) > APART
     return float(((np.linalg.norm(colour - ground, axis=1) < own) & apart).mean())
 
 
@@ -73,7 +73,7 @@ def _nearest(there: NDArray[np.bool_], at: NDArray[np.bool_]) -> tuple[NDArray[n
     return nearest[0][at], nearest[1][at]
 
 
-def _least_distance(
+def _min_distance(
     colour: NDArray[np.float32], picture: NDArray[np.float32], there: NDArray[np.bool_], at: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
     """(N,) distance from colours (N, 3) at pixels `at` to the nearest colour of `there` round about."""

@@ -18,8 +18,8 @@ from fig2mesh.records import BoolArray, Mesh
 Surface = Mesh | TexturedMesh
 
 PITCH = 0.0015
-"""Metres between the lines of sight of `look`: two of them fit between a rim and the probe of `wall_share`."""
-MOST_STEPS = 2000
+"""Metres between the lines of sight of `front_view`: two of them fit between a rim and the probe of `wall_share`."""
+MAX_STEPS = 2000
 """Lines of sight along the longer side; wider models are looked at more coarsely."""
 MAX_SIDE_PX = 1536
 """Of longer drawings only every second, third ... pixel is measured, as for the overlap of the silhouettes."""
@@ -82,12 +82,12 @@ def gap(mesh: Surface, mask: BoolArray, *, metres_per_pixel: float, origin_px: t
     return Gap(float(missing.sum()) / max(len(rows), 1), 1000 * radius_px * metres_per_pixel)
 
 
-def look(mesh: Surface) -> FrontView:
+def front_view(mesh: Surface) -> FrontView:
     """Thickness of a closed surface, ASSET, on a raster of lines of sight 1.5 mm apart."""
     from scipy.ndimage import distance_transform_edt
 
     (left, bottom), (right, top) = mesh.vertices[:, :2].min(axis=0).tolist(), mesh.vertices[:, :2].max(axis=0).tolist()
-    pitch = max(PITCH, max(right - left, top - bottom) / MOST_STEPS)
+    pitch = max(PITCH, max(right - left, top - bottom) / MAX_STEPS)
     width, height = (int(np.ceil(length / pitch)) + 2 for length in (right - left, top - bottom))
     x = left + (np.arange(width) - 0.5) * pitch
     y = top - (np.arange(height) - 0.5) * pitch

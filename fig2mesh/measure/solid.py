@@ -30,18 +30,18 @@ START = 1e-5
 class Wall:
     """Thickness of a solid across its walls, mm.
 
-    least_mm : of all samples; quantile_mm : 0.1 % of the samples are thinner
+    min_mm : of all samples; quantile_mm : 0.1 % of the samples are thinner
     """
 
-    least_mm: float
+    min_mm: float
     quantile_mm: float
 
 
 @dataclass(frozen=True)
-class Quality:
+class TriangleQuality:
     """Shape of the triangles: least and 1 % quantile of their quality, and the share below 0.05."""
 
-    least: float
+    minimum: float
     quantile: float
     slivers: float
 
@@ -102,14 +102,14 @@ def thinnest_wall(mesh: Surface) -> Wall:
     return Wall(float(thickness.min()), float(np.quantile(thickness, 0.001)))
 
 
-def quality(mesh: Surface) -> Quality:
+def quality(mesh: Surface) -> TriangleQuality:
     """How far the triangles are from equilateral: q = 4 sqrt(3) area / (sum of squared edges), 1 for equilateral.
 
     Of the usual measures this one is smooth, bounded and zero for both kinds of sliver, needles and caps. Slivers have
     no reliable normal, break ray casting and physics engines, and vanish in coordinates of few bits.
     """
     values = triangle_quality(mesh.vertices, mesh.faces)
-    return Quality(float(values.min()), float(np.quantile(values, 0.01)), float((values < SLIVER).mean()))
+    return TriangleQuality(float(values.min()), float(np.quantile(values, 0.01)), float((values < SLIVER).mean()))
 
 
 def laws(mesh: TexturedMesh) -> Laws:

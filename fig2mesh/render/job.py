@@ -24,7 +24,7 @@ from fig2mesh.render.effects import Effect, check_effects, parse_effects
 from fig2mesh.render.images_out import KINDS, check_pictures, kind_of, write_pictures
 from fig2mesh.render.model import SUFFIXES, read_model
 from fig2mesh.render.needs import needs
-from fig2mesh.render.picture import Request, render, view_of
+from fig2mesh.render.picture import PictureRequest, render, view_of
 from fig2mesh.render.request import RenderRequest
 from fig2mesh.render.scene import FieldScene, MeshScene, Scene
 from fig2mesh.render.sun import Sun, parse_time, sun_at, towards_sun
@@ -40,7 +40,7 @@ log = logging.getLogger("fig2mesh")
 FRAMES, FPS = 36, 12.5
 """A turn in three seconds; a GIF can keep 8 hundredths of a second for each frame exactly."""
 
-MOST_RAYS = 1 << 26
+MAX_RAYS = 1 << 26
 """For one picture: 8192 x 8192 pixels of one ray need 2 GB."""
 
 Colour = tuple[int, int, int]
@@ -66,8 +66,8 @@ def run(request: RenderRequest) -> None:
     sun = _sun(wanted, request.lonlat, request.time)
     moving = KINDS[kind_of(request.output)].moving
     count, rate = _timing(moving, request.frames, request.fps, request.seconds, request.output)
-    look = _picture_request(request, wanted, sun)
-    check_pictures(request.output, request.overwrite, request.size, look.background is None)
+    first = _picture_request(request, wanted, sun)
+    check_pictures(request.output, request.overwrite, request.size, first.background is None)
     if request.report is not None:
         check_text(request.report, request.overwrite)
     if sun is not None and not sun.up:
@@ -76,30 +76,30 @@ def run(request: RenderRequest) -> None:
     start = time.perf_counter()
     scene: Scene
     if fields:
-        scene = field_scene(read_figure(**request.reading()), request.settings(), look)
+        scene = field_scene(read_figure(**request.reading()), request.settings(), first)
     else:
-        scene = _mesh_scene(request.figure, look)
+        scene = _mesh_scene(request.figure, first)
     ready = time.perf_counter()
     total = _Total()
-    written = write_pictures(request.output, _turntable(scene, look, count, total), rate, request.overwrite)
+    written = write_pictures(request.output, _turntable(scene, first, count, total), rate, request.overwrite)
     done = time.perf_counter()
     if request.report is not None:
-        facts = _facts(request, look, scene, total, sun)
+        facts = _facts(request, first, scene, total, sun)
         facts["seconds"] = {"scene": round(ready - start, 3), "pictures": round(done - ready, 3)}
         facts["files"] = [path.name for path in written]
         write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     log.info("%s", request.output)
 
 
-def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun | None) -> Request:
+def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun | None) -> PictureRequest:
     """What each picture shows; the yaw is that of the first."""
     bearing = parse_facing(request.facing)
     paper = _background(request.background, KINDS[kind_of(request.output)].transparent)
     samples = request.samples or (1 if request.mode in ("depth", "parts") else 2)
-    if request.size[0] * request.size[1] * samples**2 > MOST_RAYS:
+    if request.size[0] * request.size[1] * samples**2 > MAX_RAYS:
         found = f"{request.size[0]} {request.size[1]} with {samples} samples a side"
         raise InputError("--size", found, "give less of either")
-    return Request(
+    return PictureRequest(
         request.mode,
         wanted,
         request.size,
@@ -114,7 +114,7 @@ def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun
     )
 
 
-def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Iterator[ByteArray]:
+def _turntable(scene: Scene, request: PictureRequest, count: int, total: _Total) -> Iterator[ByteArray]:
     """`count` pictures of a full turn, the first as asked for."""
     for index in range(count):
         picture = render(scene, replace(request, yaw_deg=request.yaw_deg + 360.0 * index / count))
@@ -124,7 +124,7 @@ def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Ite
         yield picture.rgba
 
 
-def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldScene:
+def field_scene(figure: Figure, settings: Settings, request: PictureRequest) -> FieldScene:
     """The part fields of a figure and, where the request shows them, its colours; nothing is meshed."""
     goals = (body, parts, textures) if needs(request.mode, request.effects).textures else (body, parts)
     done = run_stages(figure, settings, goals)
@@ -134,7 +134,7 @@ def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldSc
     return FieldScene(fields, sources, image_frame(done.figure))
 
 
-def _mesh_scene(path: Path, request: Request) -> MeshScene:
+def _mesh_scene(path: Path, request: PictureRequest) -> MeshScene:
     if not path.is_file():
         raise FigureError(path, "no such file", "check the path of the model")
     mesh = read_model(path)
@@ -196,7 +196,9 @@ def _colour(option: str, text: str) -> Colour:
     return red, green, blue
 
 
-def _facts(asked: RenderRequest, request: Request, scene: Scene, total: _Total, sun: Sun | None) -> dict[str, Any]:
+def _facts(
+    asked: RenderRequest, request: PictureRequest, scene: Scene, total: _Total, sun: Sun | None
+) -> dict[str, Any]:
     view = view_of(scene, request)
     return {
         "input": asked.figure.name,

@@ -15,7 +15,6 @@ from fig2mesh.render.effects import Effect, Mode
 from fig2mesh.render.needs import Needs, needs
 from fig2mesh.render.outline import ink_cover
 from fig2mesh.render.scene import CLEARANCE, FieldScene, Floats, Scene, height_of
-from fig2mesh.render.seen import UP, Seen, look, to_ground
 from fig2mesh.render.shading import (
     CLAY,
     GROUND,
@@ -27,7 +26,8 @@ from fig2mesh.render.shading import (
     lit,
     turns_at,
 )
-from fig2mesh.render.view import View, make_view
+from fig2mesh.render.view import CameraView, make_view
+from fig2mesh.render.visible import UP, VisiblePoints, to_ground, visible_points
 from fig2mesh.skeleton import PART_COLOURS
 
 RAYS_AT_ONCE = 1 << 19
@@ -38,7 +38,7 @@ AO_REACH = 0.25
 
 
 @dataclass(frozen=True)
-class Request:
+class PictureRequest:
     """What a picture shows.
 
     effects : names, see `fig2mesh.render.effects`; smooth-union is a matter of the scene
@@ -69,14 +69,14 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Picture:
+class RenderedPicture:
     """rgba : (H, W, 4) uint8 sRGB, straight alpha; counts : what it took."""
 
     rgba: ByteArray
     counts: Counts
 
 
-def view_of(scene: Scene, request: Request) -> View:
+def view_of(scene: Scene, request: PictureRequest) -> CameraView:
     """The camera of a request; turning alone neither moves nor zooms it."""
     return make_view(
         scene.bounds,
@@ -88,7 +88,7 @@ def view_of(scene: Scene, request: Request) -> View:
     )
 
 
-def render(scene: Scene, request: Request) -> Picture:
+def render(scene: Scene, request: PictureRequest) -> RenderedPicture:
     """A picture of a scene. Same scene, same request: same bytes."""
     need = needs(request.mode, request.effects, fields=isinstance(scene, FieldScene))
     view = view_of(scene, request)
@@ -106,57 +106,63 @@ def render(scene: Scene, request: Request) -> Picture:
         pixels = rgba.reshape(band[1] - band[0], request.samples, width, request.samples, 4).mean(axis=(1, 3))
         result[first:last] = pixels[first - band[0] : last - band[0]]
         counts += spent
-    return Picture(straight_bytes(result, request.background), counts)
+    return RenderedPicture(straight_bytes(result, request.background), counts)
 
 
-def _band(scene: Scene, request: Request, need: Needs, view: View, rows: tuple[int, int]) -> tuple[Floats, Counts]:
+def _band(
+    scene: Scene, request: PictureRequest, need: Needs, view: CameraView, rows: tuple[int, int]
+) -> tuple[Floats, Counts]:
     """(rows, W, 4) premultiplied colours 0-255 and coverage, one for every ray of the rows."""
-    seen, counts = look(scene, view.camera, rows, need, with_ground=request.ground)
-    colours, spent = _colours(scene, request, need, view, seen)
+    visible, counts = visible_points(scene, view.camera, rows, need, with_ground=request.ground)
+    colours, spent = _colours(scene, request, need, view, visible)
     counts += spent
     if need.lamp != "none" or need.ao_samples:
-        light, spent = _light(scene, request, need, seen)
+        light, spent = _light(scene, request, need, visible)
         colours = lit(colours, light)
         counts += spent
-    rgba = np.zeros((*seen.shape, 4))
+    rgba = np.zeros((*visible.shape, 4))
     flat = rgba.reshape(-1, 4)
-    flat[seen.pixels, :3], flat[seen.pixels, 3] = colours, 1.0
+    flat[visible.pixels, :3], flat[visible.pixels, 3] = colours, 1.0
     if need.edges:
-        cover = _ink(scene, request, seen)[..., None]
+        cover = _ink(scene, request, visible)[..., None]
         rgba = rgba * (1 - cover) + cover * np.array([*request.outline_colour, 1.0])
         counts += Counts(pixels_compared=len(flat))
     return rgba, counts
 
 
-def _colours(scene: Scene, request: Request, need: Needs, view: View, seen: Seen) -> tuple[Floats, Counts]:
+def _colours(
+    scene: Scene, request: PictureRequest, need: Needs, view: CameraView, visible: VisiblePoints
+) -> tuple[Floats, Counts]:
     """(M, 3) sRGB 0-255 of the points before any light."""
     counts = Counts()
     if request.mode == "depth":
-        _, directions = seen.camera.lines(seen.pixels, seen.rows[0])
-        away = seen.depth * -(directions @ seen.camera.axes[2])
+        _, directions = visible.camera.lines(visible.pixels, visible.rows[0])
+        away = visible.depth * -(directions @ visible.camera.axes[2])
         share = np.clip((view.far - away) / (view.far - view.near), 0.0, 1.0)
         return np.repeat(255.0 * share[:, None], 3, axis=1), counts
     if request.mode == "normals":
-        return 127.5 * (seen.normals @ seen.camera.axes.T + 1.0), counts
-    colours = np.empty((len(seen.pixels), 3))
-    colours[seen.ground] = GROUND
+        return 127.5 * (visible.normals @ visible.camera.axes.T + 1.0), counts
+    colours = np.empty((len(visible.pixels), 3))
+    colours[visible.ground] = GROUND
     if request.mode == "textured":
-        colours[seen.figure], counts = scene.colours(seen.surface, need)
+        colours[visible.figure], counts = scene.colours(visible.surface, need)
     elif request.mode == "clay":
-        colours[seen.figure] = CLAY
+        colours[visible.figure] = CLAY
     else:
-        colours[seen.figure] = np.array(PART_COLOURS, np.float64)[seen.surface.labels]
+        colours[visible.figure] = np.array(PART_COLOURS, np.float64)[visible.surface.labels]
     return colours, counts
 
 
-def _light(scene: Scene, request: Request, need: Needs, seen: Seen) -> tuple[Floats, Counts]:
+def _light(scene: Scene, request: PictureRequest, need: Needs, visible: VisiblePoints) -> tuple[Floats, Counts]:
     """(M,) linear light on the points."""
-    counts, normals = Counts(), seen.normals
-    start = seen.points + CLEARANCE * height_of(scene) * normals if need.shadow or need.ao_samples else seen.points
+    counts, normals = Counts(), visible.normals
+    start = (
+        visible.points + CLEARANCE * height_of(scene) * normals if need.shadow or need.ao_samples else visible.points
+    )
     openness: Any = 1.0
     if need.ao_samples:
-        rows, columns = np.divmod(seen.pixels, seen.camera.size[0])
-        turns = turns_at(columns, rows + seen.rows[0])
+        rows, columns = np.divmod(visible.pixels, visible.camera.size[0])
+        turns = turns_at(columns, rows + visible.rows[0])
         openness = _openness(scene, start, normals, turns, need.ao_samples, request.ground)
         counts += Counts(ao_rays=need.ao_samples * len(normals))
     if need.lamp in ("none", "head"):
@@ -192,19 +198,19 @@ def _openness(scene: Scene, start: Floats, normals: Floats, turns: Floats, sampl
     return result
 
 
-def _ink(scene: Scene, request: Request, seen: Seen) -> Floats:
+def _ink(scene: Scene, request: PictureRequest, visible: VisiblePoints) -> Floats:
     """(rows, W) share of each pixel that ink lines cover."""
-    count = seen.shape[0] * seen.shape[1]
+    count = visible.shape[0] * visible.shape[1]
     kinds = np.zeros(count, np.int16)
     # The rim of the ground is no line of the figure: ground and nothing are one kind.
-    kinds[seen.pixels[seen.figure]] = seen.surface.labels.astype(np.int16) + 1
+    kinds[visible.pixels[visible.figure]] = visible.surface.labels.astype(np.int16) + 1
     places, ways = np.zeros((count, 3)), np.zeros((count, 3))
-    places[seen.pixels], ways[seen.pixels] = seen.points, seen.normals
+    places[visible.pixels], ways[visible.pixels] = visible.points, visible.normals
     return ink_cover(
-        kinds.reshape(seen.shape),
-        places.reshape(*seen.shape, 3),
-        ways.reshape(*seen.shape, 3),
-        seen.camera.pixel,
+        kinds.reshape(visible.shape),
+        places.reshape(*visible.shape, 3),
+        ways.reshape(*visible.shape, 3),
+        visible.camera.pixel,
         height_of(scene),
         request.outline_px * request.samples,
     )

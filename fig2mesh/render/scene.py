@@ -33,7 +33,7 @@ BLEND_SPAN = 0.5
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceHits:
     """Where N rays meet the surface, at M points; what was not needed has no rows.
 
     depth : (N,) along the rays; infinite where nothing is met
@@ -59,13 +59,13 @@ class Scene(Protocol):
     def unit(self) -> float:
         """Length of a unit of these coordinates in the units of what was given."""
 
-    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         """First meeting with the surface of each ray of a picture's rows, from the first to before the last."""
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         """(N,) whether the surface is met within `reach`."""
 
-    def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
+    def colours(self, surface: SurfaceHits, needs: Needs) -> tuple[Floats, Counts]:
         """(M, 3) sRGB 0-255 of the points of a surface."""
 
 
@@ -94,7 +94,7 @@ class FieldScene:
     def unit(self) -> float:
         return 1.0
 
-    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         frame = render_frame(self.body, camera, rows, with_parts=needs.labels, with_normals=needs.normals)
         depth = frame.depth.reshape(-1)
         hit = np.flatnonzero(np.isfinite(depth))
@@ -107,13 +107,13 @@ class FieldScene:
         if frame.parts is not None:
             labels = self.body.labels[frame.parts.reshape(-1)[hit]]
         counts = Counts(camera_rays=len(depth), normals=frame.normals_computed)
-        return Surface(depth, points, normals, labels), counts
+        return SurfaceHits(depth, points, normals, labels), counts
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         rays = Rays(origins.astype(np.float32), directions.astype(np.float32))
         return np.asarray(trace(self.body, rays, with_normals=False).depth < reach)
 
-    def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
+    def colours(self, surface: SurfaceHits, needs: Needs) -> tuple[Floats, Counts]:
         if self.sources is None or self.frame is None:
             raise ValueError("sources and frame: None, expected the colours of the figure")
         # The drawing is seen from far along +z, as in the bake; there the mesh decides, here the field itself.
@@ -154,7 +154,7 @@ class MeshScene:
     def unit(self) -> float:
         return self._caster.unit
 
-    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         rays = camera.rays(rows)
         hits = self._caster.cast(rays.origins, rays.directions)
         points, normals, labels = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.uint8)
@@ -166,12 +166,12 @@ class MeshScene:
             nearest = hits.corners[np.arange(len(hits.corners)), hits.weights.argmax(axis=1)]
             labels = np.zeros(len(nearest), np.uint8) if self.mesh.parts is None else self.mesh.parts[nearest]
         counts = Counts(camera_rays=len(hits.depth), normals=len(normals))
-        return Surface(hits.depth, points, normals, labels, hits), counts
+        return SurfaceHits(hits.depth, points, normals, labels, hits), counts
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         return self._caster.blocked(origins, directions, reach)
 
-    def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
+    def colours(self, surface: SurfaceHits, needs: Needs) -> tuple[Floats, Counts]:
         assert surface.hits is not None
         found = self._caster.colours(surface.hits)
         if found is None:

@@ -21,7 +21,7 @@ GROUND_RADIUS = 0.36
 
 
 @dataclass(frozen=True)
-class View:
+class CameraView:
     """A camera that turns about the vertical axis through the middle of a figure, which never leaves the picture.
 
     near, far : distances from the camera's plane between which the figure lies
@@ -40,7 +40,7 @@ def ground_radius(bounds: NDArray[np.float64]) -> float:
 
 def make_view(
     bounds: Any, size: tuple[int, int], yaw_deg: float, pitch_deg: float, *, nearby: bool, ground: bool
-) -> View:
+) -> CameraView:
     """The camera for a figure in a box (2, 3); all but its direction is the same for every yaw.
 
     nearby : perspective; ground : show the disc below it as well
@@ -65,4 +65,4 @@ def make_view(
     shown = 2 * max(float(np.abs(up).max()), float(np.abs(across).max()) * height / width) / (1 - 2 * MARGIN)
     reach = float(towards.max())
     camera = Camera(yaw_deg, pitch_deg, size, shown, box.mean(axis=0), distance, nearby)
-    return View(camera, distance - reach, distance + reach)
+    return CameraView(camera, distance - reach, distance + reach)

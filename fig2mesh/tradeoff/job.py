@@ -14,7 +14,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
 
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 
 PAGE = "README.md"
 """It names the other files, and so is put in place last."""
@@ -39,7 +39,7 @@ def drawings_of(figures: Sequence[Path], keypoints: Path | None, mask: Path | No
     return found
 
 
-def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], overwrite: bool, say: Say) -> None:
+def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], overwrite: bool, log: Log) -> None:
     """Sweep all figures; writes tradeoff.csv, README.md and two plots a figure into `folder`, all or nothing."""
     from fig2mesh.tradeoff.measures import measure
     from fig2mesh.tradeoff.report import as_csv, plot, rows, summary
@@ -58,12 +58,12 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
             finest = None
             for number, run in enumerate(sweep(files.arguments(), knobs), 1):
                 label = f"{run.knob} {run.value}".strip()
-                say(f"{files.name} {number}/{count} {label}: {run.failure or f'{run.total_s:.1f} s'}")
+                log(f"{files.name} {number}/{count} {label}: {run.failure or f'{run.total_s:.1f} s'}")
                 if finest is None:
                     finest = run.mesh
                     if finest is None:
                         raise InputError(files.name, run.failure, "give a figure that the main job can make")
-                    say(f"{files.name}: errors are measured against this one")
+                    log(f"{files.name}: errors are measured against this one")
                 found.append(measure(run, finest))
             table += rows(files.name, found)
             plot(found, stage, files.name)

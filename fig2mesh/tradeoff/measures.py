@@ -16,7 +16,7 @@ from fig2mesh.tradeoff.sweep import Run
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredRun:
     """A run and its errors against the finest; NaN where it made nothing.
 
     chamfer_mm, hausdorff_mm : mean and greatest distance, both ways, of a figure 1.79 m high
@@ -29,14 +29,14 @@ class Measured:
     normal_deg: float
 
 
-def measure(run: Run, finest: TexturedMesh) -> Measured:
+def measure(run: Run, finest: TexturedMesh) -> MeasuredRun:
     """A run against the mesh of the finest."""
     if run.mesh is None:
-        return Measured(run, float("nan"), float("nan"), float("nan"))
+        return MeasuredRun(run, float("nan"), float("nan"), float("nan"))
     made, reference = _solid(run.mesh), _solid(finest)
     mean, worst = deviation(made, reference)
     angle = (normal_angle(made, reference) + normal_angle(reference, made)) / 2
-    return Measured(run, 1000 * mean, 1000 * worst, angle)
+    return MeasuredRun(run, 1000 * mean, 1000 * worst, angle)
 
 
 def normal_angle(mesh: Mesh, target: Mesh) -> float:

@@ -16,7 +16,7 @@ from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray
 from fig2mesh.texture.sources import Sources
 
-MOST_PX: Final = 1280
+MAX_PX: Final = 1280
 """Longest side of the drawing on a page."""
 
 GAP_PX: Final = 8
@@ -111,7 +111,7 @@ def _crop(
     first = np.clip(np.floor(corners[0]).astype(int) - GAP_PX, 0, size - 1)
     last = np.clip(np.ceil(corners[1]).astype(int) + GAP_PX, first + 1, size)
     cut = picture[first[1] : last[1], first[0] : last[0]]
-    factor = max(1.0, max(cut.shape[:2]) / MOST_PX)
+    factor = max(1.0, max(cut.shape[:2]) / MAX_PX)
     columns, rows = (max(1, round(n / factor)) for n in (cut.shape[1], cut.shape[0]))
     image = Image.fromarray(cut)
     if factor > 1:

@@ -23,7 +23,7 @@ from fig2mesh.records import FloatArray, PartSdf
 MARGIN: Final = 3
 """Nodes kept around the negative region: normals look one node further, outlines two."""
 
-STEEPEST: Final = 1.5
+MAX_STEP: Final = 1.5
 """Difference of neighbouring values, nodes. Of the cells that hold the surface one in fifty is steeper, where an
 outline was carved; there it moves by a third of a cell at most."""
 
@@ -37,10 +37,10 @@ INSIDE: Final = 4.0
 SPECK: Final = 27
 """Nodes; smaller islands beside a part's body are slips of its network, which the mesher drops as well."""
 
-MOST_VOXELS: Final = 4_000_000
+MAX_VOXELS: Final = 4_000_000
 """Of all bricks together; figures with more are resampled, so that pages stay below some 12 MB."""
 
-MOST_NODES: Final = 254
+MAX_NODES: Final = 254
 """Of an edge; every WebGL 2 has 3D textures of 256 texels an edge."""
 
 
@@ -87,7 +87,7 @@ def field_atlas(body: Body) -> FieldAtlas:
             grids.append((fillet, (first, second)))
     grids += [(fillet, (first, second)) for first, second, fillet in body.fillets]
     crops = [(crop, owners) for grid, owners in grids if (crop := _cut(grid)) is not None]
-    shrink = max(1.0, (sum(crop.values.size for crop, _ in crops) / MOST_VOXELS) ** (1 / 3))
+    shrink = max(1.0, (sum(crop.values.size for crop, _ in crops) / MAX_VOXELS) ** (1 / 3))
     bricks = tuple(brick for crop, owners in crops if (brick := _brick(crop, owners, shrink)) is not None)
     if not bricks:
         raise ValueError("body: no grid has a negative value, so there is nothing to show")
@@ -139,7 +139,7 @@ def _without_specks(grid: FloatArray, spacing: float) -> FloatArray:
 def _brick(crop: _Crop, owners: tuple[int, int], shrink: float) -> Brick | None:
     """The brick of a crop; None where it is thinner than the coarser nodes, so that nothing of it can be seen."""
     values, spacing = crop.values, crop.spacing
-    shrink = max(shrink, (max(values.shape) - 1) / (MOST_NODES - 1))
+    shrink = max(shrink, (max(values.shape) - 1) / (MAX_NODES - 1))
     if shrink > 1:
         counts = [max(int(np.ceil((n - 1) / shrink)) + 1, 2) for n in values.shape]
         lines = [np.minimum(np.arange(count) * shrink, n - 1) for count, n in zip(counts, values.shape, strict=True)]
@@ -166,14 +166,14 @@ def _tamed(values: FloatArray, spacing: float) -> FloatArray:
     for axis in (0, 1, 2, 0, 1, 2):
         for layers in (np.moveaxis(size, axis, 0), np.moveaxis(size, axis, 0)[::-1]):
             for before, layer in pairwise(layers):
-                np.minimum(layer, before + np.where(before < NEAR, np.float32(STEEPEST), np.float32(1)), out=layer)
+                np.minimum(layer, before + np.where(before < NEAR, np.float32(MAX_STEP), np.float32(1)), out=layer)
     size = np.where(size > NEAR, np.floor(size * 4) / 4, size)
     return np.asarray(np.where(outside, size * spacing, np.maximum(values, -INSIDE * spacing)), np.float32)
 
 
 def _shelves(shapes: list[tuple[int, ...]]) -> tuple[NDArray[np.int_], tuple[int, int, int]]:
     """Places of boxes in a texture 256 texels wide and high, row by row and layer by layer, largest first."""
-    width = height = MOST_NODES + 2
+    width = height = MAX_NODES + 2
     places = np.zeros((len(shapes), 3), int)
     x = y = z = row = layer = 0
     for i in sorted(range(len(shapes)), key=lambda i: (-shapes[i][2], -shapes[i][1], i)):

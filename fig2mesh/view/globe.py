@@ -7,12 +7,12 @@ import json
 from collections.abc import Collection
 
 from fig2mesh.view.page import figure_json
-from fig2mesh.view.scene import Scene
+from fig2mesh.view.scene import ViewScene
 from fig2mesh.view.template import asset, filled
 from georef.placement import GeoPlacement
 
 
-def globe_page(scene: Scene, placement: GeoPlacement, cesium: str, effects: Collection[str] | None = None) -> str:
+def globe_page(scene: ViewScene, placement: GeoPlacement, cesium: str, effects: Collection[str] | None = None) -> str:
     """The page of a figure that stands on the globe.
 
     cesium : address of CesiumJS as built for pages, with a slash at its end; absolute or relative to the page

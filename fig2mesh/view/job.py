@@ -22,7 +22,7 @@ from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.globe import globe_page
 from fig2mesh.view.page import EFFECTS, view_page
 from fig2mesh.view.request import ViewRequest
-from fig2mesh.view.scene import Scene, make_scene
+from fig2mesh.view.scene import ViewScene, make_scene
 from fig2mesh.view.server import page_server, show
 
 log = logging.getLogger("fig2mesh")
@@ -33,7 +33,7 @@ def run(request: ViewRequest, quiet: bool = False) -> None:
     sheet = open_map(request)
     wanted = None if request.effects is None else _effects(request.effects)
     _check(request)
-    shown = request.somewhere and request.output is None
+    shown = request.has_place and request.output is None
     folders = {CESIUM: find_cesium(request.cesium, "--lonlat")} if shown else {}
     drawn = read_figure(**request.reading())
     settings = request.settings()
@@ -55,7 +55,7 @@ def run(request: ViewRequest, quiet: bool = False) -> None:
 
 def scene_of(
     figure: Figure, settings: Settings, height_m: float, advance: Callable[[str], object] = lambda name: None
-) -> Scene:
+) -> ViewScene:
     """The scene of a figure, by those stages that it needs; advance : told the name of each."""
     done = run_stages(figure, settings, (lift, body, textures), height_m=height_m, observer=Observer(advance))
     fields, sources, pose = done.results[body], done.results[textures], done.results[lift]
@@ -71,7 +71,7 @@ def _check(request: ViewRequest) -> None:
         if output.suffix.lower() not in (".html", ".htm"):
             raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
         check_text(output, request.overwrite, "-o")
-    if request.cesium is not None and (not request.somewhere or output is not None):
+    if request.cesium is not None and (not request.has_place or output is not None):
         raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
 
 

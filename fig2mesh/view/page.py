@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from PIL import Image
 
-from fig2mesh.view.scene import LINE_COLOUR, LINE_WIDTH, Scene
+from fig2mesh.view.scene import LINE_COLOUR, LINE_WIDTH, ViewScene
 from fig2mesh.view.template import asset, filled
 
 EFFECTS: Final = {
@@ -29,7 +29,7 @@ EFFECTS: Final = {
 """Effect → what it adds. In capitals these are the names of #defines in the shader."""
 
 
-def view_page(scene: Scene, effects: Collection[str] | None = None) -> str:
+def view_page(scene: ViewScene, effects: Collection[str] | None = None) -> str:
     """The stand-alone page of a scene, to be turned and looked at in any browser with WebGL 2.
 
     effects : that are on at first; None: `default_effects`
@@ -46,13 +46,13 @@ def view_page(scene: Scene, effects: Collection[str] | None = None) -> str:
     )
 
 
-def default_effects(scene: Scene) -> tuple[str, ...]:
+def default_effects(scene: ViewScene) -> tuple[str, ...]:
     """What a page shows at first. Drawings that keep their own contours need no outline."""
     off = {"perspective", "outline"} if scene.contours else {"perspective"}
     return tuple(effect for effect in EFFECTS if effect not in off)
 
 
-def figure_json(scene: Scene, effects: Collection[str] | None = None) -> str:
+def figure_json(scene: ViewScene, effects: Collection[str] | None = None) -> str:
     """The scene as JSON, textures in base64; safe inside of a script element."""
     field, colours, depth = scene.field, scene.colours, scene.depth
     picture, kind = _encoded(scene)
@@ -93,7 +93,7 @@ def figure_json(scene: Scene, effects: Collection[str] | None = None) -> str:
     return json.dumps(facts, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 
-def _encoded(scene: Scene) -> tuple[bytes, str]:
+def _encoded(scene: ViewScene) -> tuple[bytes, str]:
     """The colour atlas as a lossless file, and its media type."""
     stream = io.BytesIO()
     Image.fromarray(scene.colours.picture).save(stream, "WEBP", lossless=True, quality=60)

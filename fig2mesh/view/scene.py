@@ -21,7 +21,7 @@ LINE_WIDTH = 0.009
 
 
 @dataclass(frozen=True)
-class Scene:
+class ViewScene:
     """A figure as textures and numbers.
 
     slots : for each brick the slot of `colours` that its unseen sides have
@@ -47,7 +47,7 @@ class Scene:
 
 def make_scene(
     name: str, body: Body, sources: Sources, frame: ImageFrame, pose: Pose3D, height_m: float, contours: bool = True
-) -> Scene:
+) -> ViewScene:
     """The scene of a figure that is `height_m` high and of which the pipeline has made `body` and `sources`."""
     field, bounds = field_atlas(body), body.bounds()
     colours = colour_atlas(sources, frame, body)
@@ -56,7 +56,7 @@ def make_scene(
     pen = None
     if sources.pen is not None:
         pen = (tuple(float(c) for c in sources.pen.colour), float(sources.pen.width))
-    return Scene(
+    return ViewScene(
         name=name,
         field=field,
         colours=colours,

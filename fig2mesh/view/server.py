@@ -42,7 +42,7 @@ def page_server(
     body = page.encode("utf-8")
     shared = {name: folder.resolve() for name, folder in (folders or {}).items()}
 
-    class Handler(BaseHTTPRequestHandler):
+    class PageHandler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             address = unquote(urlsplit(self.path).path)
             if address in ("/", "/index.html"):
@@ -72,7 +72,7 @@ def page_server(
             """Nothing: the terminal shows the address and no more."""
 
     try:
-        return ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        return ThreadingHTTPServer(("127.0.0.1", port), PageHandler)
     except OSError as error:
         remedy = "choose another one, or leave it out"
         raise InputError("--port", f"{port} cannot be used ({error.strerror})", remedy) from None

@@ -19,8 +19,8 @@ from fig2mesh.batch.collections.rows import (
     FIGURE,
     MAX_RECORD,
     MAX_TEXT,
+    InvalidValue,
     Row,
-    Unfit,
     check_columns,
     column_name,
     make_row,
@@ -131,14 +131,14 @@ def csv_rows(path: Path) -> Iterator[Row]:
         number = 0
         while True:
             first = lines.begin()
-            problem: Unfit | None = None
+            problem: InvalidValue | None = None
             cells: Sequence[str] = ()
             try:
                 cells = next(table)
             except StopIteration:
                 return
             except _TooLong:
-                problem = Unfit(f"more than {MAX_RECORD:,} characters", "close its quotes, or shorten it")
+                problem = InvalidValue(f"more than {MAX_RECORD:,} characters", "close its quotes, or shorten it")
                 lines.back()
             except csv.Error as error:
                 problem = _unquoted(error)
@@ -157,24 +157,24 @@ def _table(lines: _Lines, separator: str) -> Iterator[list[str]]:
     return csv.reader(lines, delimiter=separator, skipinitialspace=separator != "\t", strict=True)
 
 
-def _unquoted(error: csv.Error) -> Unfit:
+def _unquoted(error: csv.Error) -> InvalidValue:
     if "field larger" in str(error):
-        return Unfit(f"a cell of more than {MAX_TEXT:,} characters", "close its quotes, or shorten it")
+        return InvalidValue(f"a cell of more than {MAX_TEXT:,} characters", "close its quotes, or shorten it")
     if "unexpected end" in str(error):
-        return Unfit("a quote that does not close", "close it, and double quotes within quotes")
-    return Unfit("a quote in the middle of a cell", "double quotes within quotes")
+        return InvalidValue("a quote that does not close", "close it, and double quotes within quotes")
+    return InvalidValue("a quote in the middle of a cell", "double quotes within quotes")
 
 
-def _misfit(names: Sequence[str], cells: Sequence[str]) -> Unfit | None:
+def _misfit(names: Sequence[str], cells: Sequence[str]) -> InvalidValue | None:
     count = len(cells)
     while count > len(names) and not cells[count - 1].strip():
         count -= 1
     if count != len(names):
         remedy = "quote cells that hold the separator" if count > len(names) else "give all of them, also empty ones"
-        return Unfit(f"{count} cells under {len(names)} headings", remedy)
+        return InvalidValue(f"{count} cells under {len(names)} headings", remedy)
     for name, cell in zip(names, cells, strict=False):
         if not name and cell.strip():
-            return Unfit(f"{shown(cell)!r} under an empty heading", "name the column")
+            return InvalidValue(f"{shown(cell)!r} under an empty heading", "name the column")
     return None
 
 

@@ -17,9 +17,9 @@ from fig2mesh.batch.collections.rows import (
     MAX_NESTING,
     MAX_RECORD,
     MAX_TEXT,
+    InvalidValue,
     Point,
     Row,
-    Unfit,
     column_name,
     fit,
     make_row,
@@ -41,11 +41,11 @@ CHUNK = 1 << 16
 OPEN = ("start_map", "start_array")
 CLOSE = ("end_map", "end_array")
 
-OBJECT = Unfit("a value that is an object", "give text, a number, or a list of them")
-DEEP = Unfit(f"lists nested deeper than {MAX_NESTING}", "flatten them")
-LONG = Unfit(f"a list of more than {MAX_ITEMS:,} items", "shorten it")
-TEXT = Unfit(f"more than {MAX_TEXT:,} characters", "give a shorter text")
-TWICE = Unfit("given twice", "give it once")
+OBJECT = InvalidValue("a value that is an object", "give text, a number, or a list of them")
+DEEP = InvalidValue(f"lists nested deeper than {MAX_NESTING}", "flatten them")
+LONG = InvalidValue(f"a list of more than {MAX_ITEMS:,} items", "shorten it")
+TEXT = InvalidValue(f"more than {MAX_TEXT:,} characters", "give a shorter text")
+TWICE = InvalidValue("given twice", "give it once")
 
 BROKEN = (ijson.JSONError, ValueError, ArithmeticError)
 """What the parsers of ijson raise for bytes that are not JSON: ValueError for texts that are not Unicode,
@@ -108,15 +108,15 @@ class Feature:
 
     kind: object = None
     properties: dict[str, object] = field(default_factory=dict)
-    geometry: Point | Unfit | None = None
-    problem: Unfit | None = None
+    geometry: Point | InvalidValue | None = None
+    problem: InvalidValue | None = None
     seen: set[str] = field(default_factory=set)
 
     def row(self, number: int, where: str) -> Row:
         problem = self.problem
         if self.kind != "Feature" and problem is None:
             kind = "no type" if self.kind is None else f"type {shown(self.kind)}"
-            problem = Unfit(f"{kind} where a Feature is expected", "give features")
+            problem = InvalidValue(f"{kind} where a Feature is expected", "give features")
         return make_row(number, where, self.properties.items(), problem, lambda: self.geometry)
 
     def member(self, key: str, events: Events) -> None:
@@ -126,7 +126,7 @@ class Feature:
             skip(events, event in OPEN)
             return
         if key in self.seen:
-            self.problem = self.problem or TWICE.of(key)
+            self.problem = self.problem or TWICE.in_column(key)
         self.seen.add(key)
         if key == "type":
             self.kind = value if event == "string" else event
@@ -136,7 +136,7 @@ class Feature:
         elif event == "start_map":
             self.geometry = _geometry(events)
         elif event != "null":
-            self.problem = self.problem or Unfit("no object", "give an object, or null").of(key)
+            self.problem = self.problem or InvalidValue("no object", "give an object, or null").in_column(key)
             skip(events, event in OPEN)
 
 
@@ -146,7 +146,7 @@ def read_feature(events: Events, first: Event) -> Feature:
     event, value = first
     if event != "start_map":
         skip(events, event in OPEN)
-        feature.problem = Unfit("no object where a Feature is expected", "give features")
+        feature.problem = InvalidValue("no object where a Feature is expected", "give features")
         return feature
     for event, value in events:
         if event == "end_map":
@@ -155,9 +155,9 @@ def read_feature(events: Events, first: Event) -> Feature:
     return feature
 
 
-def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
+def _properties(events: Events, found: dict[str, object]) -> InvalidValue | None:
     """Read the members of an object into values by column; what is wrong with it as a whole, or None."""
-    problem: Unfit | None = None
+    problem: InvalidValue | None = None
     room = MAX_RECORD
     for event, key in events:
         if event == "end_map":
@@ -167,7 +167,7 @@ def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
         if problem is not None or room < 0 or len(found) >= MAX_COLUMNS:
             if problem is None:
                 much = f"{MAX_COLUMNS:,} properties" if room >= 0 else f"{MAX_RECORD:,} characters in its properties"
-                problem = Unfit(f"more than {much}", "leave some out")
+                problem = InvalidValue(f"more than {much}", "leave some out")
             skip(events, event in OPEN)
             continue
         if event == "start_map":
@@ -181,7 +181,7 @@ def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
             value = value if len(value) <= MAX_TEXT else TEXT
         name = column_name(key)
         if not name:
-            value = Unfit("a property without a name", "name it") if value is not None else None
+            value = InvalidValue("a property without a name", "name it") if value is not None else None
         found[name] = TWICE if name in found else value
     return problem
 
@@ -192,7 +192,7 @@ def _length(value: object) -> int:
     return len(value) if isinstance(value, str) else 0
 
 
-def _list(events: Events, room: int = MAX_RECORD) -> tuple[object, ...] | Unfit:
+def _list(events: Events, room: int = MAX_RECORD) -> tuple[object, ...] | InvalidValue:
     """The rest of a list with the lists in it; room: characters that its texts may have."""
     stack: list[list[object]] = [[]]
     count = 0
@@ -229,7 +229,7 @@ def skip(events: Events, depth: int) -> None:
                 return
 
 
-def _geometry(events: Events) -> Point | Unfit | None:
+def _geometry(events: Events) -> Point | InvalidValue | None:
     """The point of a geometry object; None: it is empty."""
     kind: object = None
     coordinates: object = None
@@ -246,12 +246,12 @@ def _geometry(events: Events) -> Point | Unfit | None:
     if kind == "MultiPoint" and isinstance(coordinates, tuple) and len(coordinates) == 1:
         coordinates = coordinates[0]
     elif kind != "Point":
-        return Unfit(f"its geometry is a {shown(kind)}", "give a Point, or columns lon and lat")
+        return InvalidValue(f"its geometry is a {shown(kind)}", "give a Point, or columns lon and lat")
     if coordinates == ():
         return None
     if not isinstance(coordinates, tuple) or len(coordinates) < 2:
-        return Unfit("a point without two coordinates", "give longitude and latitude")
+        return InvalidValue("a point without two coordinates", "give longitude and latitude")
     numbers = [fit(each) for each in coordinates[:3]]
     if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in numbers):
-        return Unfit(f"a point at {shown(coordinates)}", "give finite numbers")
+        return InvalidValue(f"a point at {shown(coordinates)}", "give finite numbers")
     return Point(*(float(each) for each in numbers))  # type: ignore[arg-type]

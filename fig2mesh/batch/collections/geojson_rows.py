@@ -24,7 +24,7 @@ from fig2mesh.batch.collections.geojson_feature import (
     read_feature,
     skip,
 )
-from fig2mesh.batch.collections.rows import MAX_NESTING, Row, Unfit, make_row, shown
+from fig2mesh.batch.collections.rows import MAX_NESTING, InvalidValue, Row, make_row, shown
 from fig2mesh.errors import InputError
 
 MAX_LINE = 1 << 24
@@ -115,7 +115,7 @@ def _records(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
 def _sequence(records: Iterator[tuple[str, bytes | None]]) -> Iterator[Row]:
     for number, (where, record) in enumerate(records, start=1):
         if record is None:
-            yield make_row(number, where, (), Unfit(f"more than {MAX_LINE:,} bytes", "simplify its geometry"))
+            yield make_row(number, where, (), InvalidValue(f"more than {MAX_LINE:,} bytes", "simplify its geometry"))
             continue
         try:
             events = events_of(BytesIO(record))
@@ -124,7 +124,7 @@ def _sequence(records: Iterator[tuple[str, bytes | None]]) -> Iterator[Row]:
                 pass
             row = feature.row(number, where)
         except NotJson as error:
-            row = make_row(number, where, (), Unfit(f"not JSON ({error})", JSON))
+            row = make_row(number, where, (), InvalidValue(f"not JSON ({error})", JSON))
         yield row
 
 

@@ -20,9 +20,9 @@ from fig2mesh.batch.collections.rows import (
     FIGURE,
     MAX_RECORD,
     MAX_TEXT,
+    InvalidValue,
     Point,
     Row,
-    Unfit,
     check_columns,
     column_name,
     make_row,
@@ -50,7 +50,7 @@ a minute. A table takes a few for a row."""
 
 NOT_ONE = "give a file as QGIS or GDAL writes it"
 
-Transform = Callable[[Sequence[Point]], Sequence[Point | Unfit]]
+Transform = Callable[[Sequence[Point]], Sequence[Point | InvalidValue]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,18 +95,18 @@ def geopackage_rows(path: Path, layer: str | None = None) -> Iterator[Row]:
                 yield _row(number, chosen, raw, point)
 
 
-def _row(number: int, layer: _Layer, raw: Sequence[object], point: Point | Unfit | None) -> Row:
+def _row(number: int, layer: _Layer, raw: Sequence[object], point: Point | InvalidValue | None) -> Row:
     where = f"row {number}" if layer.fid is None else f"fid {raw[0]}"
     found: list[tuple[str, object]] = []
     room = MAX_RECORD
     for (_, name, truth), value in zip(layer.columns, raw[2:], strict=True):
         if isinstance(value, bytes):
-            value = Unfit(f"more than {MAX_TEXT:,} characters", "give a shorter text")
+            value = InvalidValue(f"more than {MAX_TEXT:,} characters", "give a shorter text")
         elif truth and value in (0, 1):
             value = bool(value)
         room -= len(value) if isinstance(value, str) else 0
         found.append((name, value))
-    problem = None if room >= 0 else Unfit(f"more than {MAX_RECORD:,} characters", "shorten it")
+    problem = None if room >= 0 else InvalidValue(f"more than {MAX_RECORD:,} characters", "shorten it")
     return make_row(number, where, found if problem is None else (), problem, lambda: point)
 
 
@@ -248,14 +248,14 @@ def _chunks(connection: sqlite3.Connection, layer: _Layer) -> Iterator[list[Sequ
         yield chunk
 
 
-def _point(blob: object) -> Point | Unfit | None:
+def _point(blob: object) -> Point | InvalidValue | None:
     """The point of a geometry, in its reference system; None: there is none, or it is empty.
 
     A header (GeoPackage 2.1.3) and well-known binary: of ISO, or with the flags that others put into its type.
     """
     if not isinstance(blob, bytes):
         return None
-    broken = Unfit("a geometry that cannot be read", "write the layer again")
+    broken = InvalidValue("a geometry that cannot be read", "write the layer again")
     if len(blob) < 8 or blob[:2] != b"GP" or blob[3] >> 1 & 7 > 4:
         return broken
     start = 8 + (0, 32, 48, 48, 64)[blob[3] >> 1 & 7]
@@ -266,12 +266,14 @@ def _point(blob: object) -> Point | Unfit | None:
             if count == 0:
                 return None
             if count > 1:
-                return Unfit(f"its geometry is a MultiPoint of {count:,}", "give a Point, or columns lon and lat")
+                return InvalidValue(
+                    f"its geometry is a MultiPoint of {count:,}", "give a Point, or columns lon and lat"
+                )
             kind, order, has_z, start = _head(blob, start + 4)
         if kind != 1:
             name = ("geometry", "Point", "LineString", "Polygon", "MultiPoint", "MultiLineString", "MultiPolygon")
             what = name[kind] if kind < len(name) else name[0]
-            return Unfit(f"its geometry is a {what}", "give a Point, or columns lon and lat")
+            return InvalidValue(f"its geometry is a {what}", "give a Point, or columns lon and lat")
         x, y = struct.unpack_from(order + "dd", blob, start)
         z = struct.unpack_from(order + "d", blob, start + 16)[0] if has_z else math.nan
     except struct.error:
@@ -279,7 +281,7 @@ def _point(blob: object) -> Point | Unfit | None:
     if math.isnan(x) and math.isnan(y):
         return None
     if not (math.isfinite(x) and math.isfinite(y)) or math.isinf(z):
-        return Unfit(f"a point at {x} {y}", "give finite numbers")
+        return InvalidValue(f"a point at {x} {y}", "give finite numbers")
     return Point(x, y, None if math.isnan(z) else z)
 
 
@@ -296,7 +298,7 @@ def _to_wgs84(connection: sqlite3.Connection, srs: int | None) -> Transform:
     """From the coordinates of a layer to WGS 84, by the number of its reference system."""
     if srs == 4326:
         return lambda points: points
-    nothing = Unfit("its layer has no reference system", "assign one, or give columns lon and lat")
+    nothing = InvalidValue("its layer has no reference system", "assign one, or give columns lon and lat")
     if srs is None or srs in (0, -1):
         return lambda points: [nothing] * len(points)
     found = connection.execute("SELECT * FROM gpkg_spatial_ref_sys WHERE srs_id = ?", (srs,))

@@ -86,7 +86,7 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class Unfit:
+class InvalidValue:
     """In place of a value, geometry or row that can't be used."""
 
     finding: str
@@ -95,8 +95,8 @@ class Unfit:
     def __str__(self) -> str:
         return f"{self.finding}; {self.remedy}"
 
-    def of(self, name: str) -> Unfit:
-        return Unfit(f"{shown(name)}: {self.finding}", self.remedy)
+    def in_column(self, name: str) -> InvalidValue:
+        return InvalidValue(f"{shown(name)}: {self.finding}", self.remedy)
 
 
 def shown(value: object, most: int = SHOWN) -> str:
@@ -129,59 +129,61 @@ def check_columns(source: object, names: Sequence[str]) -> None:
         seen.add(name)
 
 
-def fit_text(text: str) -> str | Unfit | None:
+def fit_text(text: str) -> str | InvalidValue | None:
     """A text without the blanks around it; None: nothing is left of it."""
     if len(text) > MAX_TEXT:
-        return Unfit(f"more than {MAX_TEXT:,} characters", "give a shorter text")
+        return InvalidValue(f"more than {MAX_TEXT:,} characters", "give a shorter text")
     text = text.strip()
     if not text.isascii() and _SURROGATE.search(text):
-        return Unfit("bytes that are no UTF-8", "write the text again")
+        return InvalidValue("bytes that are no UTF-8", "write the text again")
     if "\0" in text:
-        return Unfit("a NUL character", "remove it")
+        return InvalidValue("a NUL character", "remove it")
     return text or None
 
 
-def fit(value: object) -> Value | Unfit | None:
+def fit(value: object) -> Value | InvalidValue | None:
     """A value as a row may have it: finite, not too long, without objects in it."""
     if isinstance(value, str):
         return fit_text(value)
-    if value is None or isinstance(value, bool) or isinstance(value, Unfit):  # noqa: SIM101 (twice as fast)
+    if value is None or isinstance(value, bool) or isinstance(value, InvalidValue):  # noqa: SIM101 (twice as fast)
         return value
     if isinstance(value, int):
-        return value if abs(value) <= MAX_INTEGER else Unfit("an integer of more than 64 bits", "write it as text")
+        return (
+            value if abs(value) <= MAX_INTEGER else InvalidValue("an integer of more than 64 bits", "write it as text")
+        )
     if isinstance(value, float | Decimal):
         number = float(value)
-        return number if math.isfinite(number) else Unfit("not a finite number", "leave it empty")
+        return number if math.isfinite(number) else InvalidValue("not a finite number", "leave it empty")
     if isinstance(value, tuple):
         items = []
         for item in map(fit, value):
             if item is None:
-                return Unfit("an empty item in a list", "fill the list, or leave it out")
-            if isinstance(item, Unfit):
+                return InvalidValue("an empty item in a list", "fill the list, or leave it out")
+            if isinstance(item, InvalidValue):
                 return item
             items.append(item)
         return tuple(items) or None
-    return Unfit(f"a value of type {type(value).__name__}", "give text or a number")
+    return InvalidValue(f"a value of type {type(value).__name__}", "give text or a number")
 
 
-def _number(value: Value) -> float | Unfit:
+def _number(value: Value) -> float | InvalidValue:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     if isinstance(value, str):
         if _NUMBER.fullmatch(value):
             number = float(value)
-            return number if math.isfinite(number) else Unfit("not a finite number", "leave it empty")
+            return number if math.isfinite(number) else InvalidValue("not a finite number", "leave it empty")
         if _NUMBER.fullmatch(value.replace(",", ".")):
-            return Unfit(f"{shown(value)!r} has a comma", "write a decimal point")
-    return Unfit(f"{shown(value)!r} is no number", "give a number with a decimal point")
+            return InvalidValue(f"{shown(value)!r} has a comma", "write a decimal point")
+    return InvalidValue(f"{shown(value)!r} is no number", "give a number with a decimal point")
 
 
 def make_row(
     number: int,
     where: str,
     found: Iterable[tuple[str, object]],
-    problem: Unfit | None = None,
-    point: Callable[[], Point | Unfit | None] = lambda: None,
+    problem: InvalidValue | None = None,
+    point: Callable[[], Point | InvalidValue | None] = lambda: None,
 ) -> Row:
     """A row from what a reader found in a file.
 
@@ -194,22 +196,22 @@ def make_row(
         value = fit(raw)
         if value is None:
             continue
-        if name in NUMBERS and not isinstance(value, Unfit):
+        if name in NUMBERS and not isinstance(value, InvalidValue):
             value = _number(value)
-        elif name in PATHS and not isinstance(value, str | Unfit):
-            value = Unfit(f"{shown(value)} is no path", "give the path of a file as text")
-        if isinstance(value, Unfit):
-            problem = problem or value.of(name)
+        elif name in PATHS and not isinstance(value, str | InvalidValue):
+            value = InvalidValue(f"{shown(value)} is no path", "give the path of a file as text")
+        if isinstance(value, InvalidValue):
+            problem = problem or value.in_column(name)
         else:
             values[name] = value
     if problem is None and not any(name in values for name in PLACES):
         place = point()
-        if isinstance(place, Unfit):
+        if isinstance(place, InvalidValue):
             problem = place
         elif place is not None:
             values.update(lon=place.lon, lat=place.lat)
             if place.altitude is not None:
                 values.setdefault("altitude", place.altitude)
     if problem is None and FIGURE not in values:
-        problem = Unfit(f"no {FIGURE}", f"give the path of its picture as {FIGURE}")
+        problem = InvalidValue(f"no {FIGURE}", f"give the path of its picture as {FIGURE}")
     return Row(number, where, values, None if problem is None else str(problem))

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from fig2mesh.field.camera import Camera
 from fig2mesh.render.counts import Counts
 from fig2mesh.render.needs import Needs
-from fig2mesh.render.scene import Floats, Scene, Surface
+from fig2mesh.render.scene import Floats, Scene, SurfaceHits
 from fig2mesh.render.view import ground_radius
 
 UP = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
-class Seen:
+class VisiblePoints:
     """M points seen by the pixels of some rows of a picture, in the order of the pixels.
 
     camera : of the whole picture; rows : the first, and the first of those that follow
@@ -30,7 +30,7 @@ class Seen:
 
     camera: Camera
     rows: tuple[int, int]
-    surface: Surface
+    surface: SurfaceHits
     pixels: NDArray[np.intp]
     ground: NDArray[np.bool_]
     depth: Floats
@@ -48,9 +48,9 @@ class Seen:
         return self.rows[1] - self.rows[0], self.camera.size[0]
 
 
-def look(
+def visible_points(
     scene: Scene, camera: Camera, rows: tuple[int, int], needs: Needs, *, with_ground: bool
-) -> tuple[Seen, Counts]:
+) -> tuple[VisiblePoints, Counts]:
     """The figure and, if asked for, the ground, as a camera sees them."""
     surface, counts = scene.meet(camera, rows, needs)
     depth = surface.depth.astype(np.float64)
@@ -68,7 +68,7 @@ def look(
             points = _merged(ground, origins + depth[ground, None] * directions, points)
         if needs.normals:
             normals = _merged(ground, UP, normals)
-    return Seen(camera, rows, surface, pixels, ground, depth, points, normals), counts
+    return VisiblePoints(camera, rows, surface, pixels, ground, depth, points, normals), counts
 
 
 def to_ground(origins: Floats, directions: Floats, bounds: Floats) -> Floats:
