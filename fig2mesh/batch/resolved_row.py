@@ -1,4 +1,4 @@
-"""A row whose files have been found: its request, and digests of all that its outputs depend on."""
+"""A row whose files have been resolved: its request, and digests of everything that its outputs depend on."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 
 class ResolvedRow:
-    """A row's request with the files that it names.
+    """A row's request with resolved paths.
 
-    request : with paths that can be opened from anywhere
+    request : with paths that can be opened from any folder
     inputs : digest of every file that it depends on, by path
-    key : digest of all that its outputs depend on
+    key : digest of everything that its outputs depend on
 
     Raises InputError naming the column.
     """
@@ -41,7 +41,7 @@ class ResolvedRow:
         resolved = resolve(task.request, batch.roots, task.own_files)
         self.request: Request = replace(resolved, outputs=self.targets)
         if not (resolved.has_place or batch.unplaced):
-            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or pass --unplaced")
+            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or use --unplaced")
         files = input_files(resolved)
         self.inputs: dict[str, str] = {
             self._relative(file): digest_of(file) for name in sorted(files) for file in files[name]
@@ -61,7 +61,7 @@ class ResolvedRow:
         return (real.relative_to(root) if real.is_relative_to(root) else real).as_posix()
 
     def sheet(self) -> MapSheet | None:
-        """The map that the place is from, if any. Raises InputError."""
+        """Map sheet of the place, if any. Raises InputError."""
         from fig2mesh.conversion.place import open_map
 
         if self.request.map is None:
@@ -71,18 +71,18 @@ class ResolvedRow:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Outputs as seen from the folder of the figure."""
+        """Outputs, relative to the folder of the figure."""
         suffixes = dict.fromkeys(("glb", *(each.lower().lstrip(".") for each in self.task.formats)))
         return tuple(f"{self.task.name}.{suffix}" for suffix in suffixes)
 
     def is_current(self, record: dict[str, Any]) -> bool:
-        """Whether a record of the same key says how this ends: its outputs are there, or its failure is lasting."""
+        """Whether a record of the same key is up to date: its outputs are unchanged, or its failure is permanent."""
         if record["status"] == "failed":
             return bool(record.get("lasting"))
         return record["status"] == "done" and files_unchanged(self.batch.folder, record["outputs"])
 
     def profile(self) -> Profile:
-        """What the client of the outputs takes. Raises InputError where it does not read them."""
+        """Profile of the outputs' client. Raises InputError if the client does not read them."""
         from exporters.profiles import profile_named
         from exporters.write import needs_place
 
@@ -91,16 +91,16 @@ class ResolvedRow:
         for target in self.targets:
             profile.check(target, Path(target).suffix.lower())
             if needs_place(target) and not self.request.has_place:
-                raise InputError("column format", f"{target} needs a place on earth", "give lon and lat")
+                raise InputError("column format", f"{target} needs a place on the earth", "give lon and lat")
         return profile
 
     def check_values(self) -> None:
-        """Check all that can be without reading the figure. Raises InputError."""
+        """Check everything that needs no reading of the figure. Raises InputError."""
         self.profile()
         self.sheet()
 
     def check(self) -> None:
-        """Check the values, and read the figure's files as far as they are given. Raises InputError."""
+        """Check the values, and read the given files of the figure. Raises InputError."""
         from fig2mesh.parse.read import read_given
 
         self.check_values()
@@ -109,7 +109,7 @@ class ResolvedRow:
 
 @lru_cache(maxsize=8)
 def _open_map(request: PlaceRequest, digests: tuple[str, ...]) -> MapSheet | None:
-    """The sheet of a request; the same one is read once."""
+    """Map sheet of a request, cached by the digests of its files."""
     from fig2mesh.conversion.place import open_map
 
     return open_map(request)

@@ -1,4 +1,4 @@
-"""Rows with their names, spooled to a file: read once, from then on the same whatever happens to the collection."""
+"""Tasks of the rows, with unique names, spooled to a file so that later changes of the collection have no effect."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
-"""What a row may ask for; .glb is always made."""
+"""Formats that a row may request; .glb is always made."""
 
 MAX_NAME: Final = 60
 """Characters of a folder's name; file systems allow 255 bytes, and a character takes up to four."""
 
 TAKEN: Final = ("tileset.json", "index.geojson", "index.gpkg", "figures.czml", "collection.json", "manifest.jsonl")
-"""Files in the folder of the outputs, which no figure may be called."""
+"""Names of files in the output folder, which no figure may have."""
 
 
 class Names:
-    """Which names are taken, in a file that goes away by itself: a million of them take no memory."""
+    """Names that are taken, in a temporary database file, so that a million of them need no memory."""
 
     def __init__(self) -> None:
         self._table = sqlite3.connect("")
@@ -38,8 +38,8 @@ class Names:
         self._table.executemany("insert into names values (?, 0)", [(name.casefold(),) for name in TAKEN])
 
     def take(self, name: str, row: int) -> int | None:
-        """Take a name for a row; the row that has it already, if any (0: it is ours)."""
-        # Some file systems take Anna and anna for the same file.
+        """Reserve a name for a row; return the row that already has it, if any (0: a file of the batch)."""
+        # Some file systems do not distinguish Anna and anna.
         found = self._table.execute("select row from names where name = ?", (name.casefold(),)).fetchone()
         if found is not None:
             return int(found[0])
@@ -47,14 +47,14 @@ class Names:
         return None
 
     def close(self) -> None:
-        """Let the file go."""
+        """Delete the file."""
         self._table.close()
 
 
 def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> Iterator[RowTask]:
-    """Rows with names: the one that a row gives, else the stem of its picture, with a number where that is taken.
+    """Tasks of rows, named by the row or else by the stem of its picture, with a number if the name is taken.
 
-    defaults : options for rows that have none, by column
+    defaults : options for rows without them, by column
     """
     with closing(Names()) as names:
         for row in rows:
@@ -73,14 +73,14 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     while (other := names.take(name, row.number)) is not None:
         if given is not None and problem is None:
             whose = f"also that of row {other}" if other else "that of a file of the batch"
-            problem = _problem(row.where, f"its name {name} is {whose}; give each row a name of its own")
+            problem = _problem(row.where, f"its name {name} is {whose}; give each row a unique name")
         number += 1
         name = f"{wanted}_{number}"
     return make_task(row, name, title, defaults, problem)
 
 
 def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> RowTask:
-    """The task of a row; problem : what is known to be wrong with it already."""
+    """Task of a row; problem : one that has already been found."""
     values = row.values
     formats = list_of(values.get("format", defaults.get("format", ())))
     date = values.get("date", defaults.get("date"))
@@ -106,10 +106,12 @@ def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], prob
 
 
 def check_formats(formats: Iterable[str], where: str) -> None:
-    """Raise InputError, about `where`, for a suffix that a row may not ask for."""
+    """Raise InputError, naming `where`, for a format that a row may not request."""
     for each in formats:
         if each.lower().lstrip(".") not in FORMATS:
-            raise InputError(where, each[:40] or "empty", f"choose from {', '.join(FORMATS)}; .glb is always made")
+            raise InputError(
+                where, f"unknown format {each[:40]!r}", f"choose from {', '.join(FORMATS)}; .glb is always made"
+            )
 
 
 def _problem(where: str, text: str) -> Problem:
@@ -118,7 +120,7 @@ def _problem(where: str, text: str) -> Problem:
 
 
 def write_spool(tasks: Iterable[RowTask], path: Path) -> tuple[int, dict[str, int]]:
-    """Write tasks to a file, one a line; returns their number, and in how many rows each attribute has a value."""
+    """Write tasks to a file, one per line; return their number, and the number of rows with each attribute."""
     count = 0
     unknown: dict[str, int] = {}
     with path.open("w", encoding="utf-8") as stream:
@@ -132,7 +134,7 @@ def write_spool(tasks: Iterable[RowTask], path: Path) -> tuple[int, dict[str, in
 
 
 def read_spool(path: Path) -> Iterator[RowTask]:
-    """The tasks in a file."""
+    """Tasks of a spool file."""
     with path.open(encoding="utf-8") as stream:
         for line in stream:
             yield _task_from(json.loads(line))

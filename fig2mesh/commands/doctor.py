@@ -1,4 +1,4 @@
-"""`fig2mesh doctor`: check that everything that the pipeline needs is there and works."""
+"""`fig2mesh doctor`: check that everything the pipeline needs is installed and works."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fig2mesh.mesh.close_pymeshlab import SYSTEM_LIBRARIES
 
 @click.command()
 def doctor() -> None:
-    """Say whether everything that fig2mesh needs is there and works."""
+    """Check that everything fig2mesh needs is installed and works."""
     healthy = True
-    for name, fine, text in examine():
-        healthy &= fine
-        click.echo(f"{'ok  ' if fine else 'FAIL'} {name}: {text}")
+    for name, ok, text in examine():
+        healthy &= ok
+        click.echo(f"{'ok  ' if ok else 'FAIL'} {name}: {text}")
     if not healthy:
         raise SystemExit(1)
 
@@ -39,7 +39,7 @@ def examine() -> Iterator[tuple[str, bool, str]]:
 
 
 def _filters() -> tuple[str, bool, str]:
-    """Without libOpenGL importing pymeshlab succeeds and the filters are silently missing."""
+    """Check PyMeshLab's filters: without libOpenGL the import succeeds, but they are missing."""
     try:
         import pymeshlab
 

@@ -1,4 +1,4 @@
-"""`fig2mesh train`: one command a network; nothing heavy is imported before a command runs."""
+"""`fig2mesh train`: one command per network; heavy imports wait until a command runs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
-"""Names of `fig2mesh.nets.disn.VARIANTS`, again, because that imports torch."""
+"""Names of `fig2mesh.nets.disn.VARIANTS`, repeated because that module imports torch."""
 
 BUDGET_MIN = {
     "pose": 60.0,
@@ -29,18 +29,31 @@ BUDGET_MIN = {
     "head": 20.0,
     "parse": 240.0,
 }
-"""Minutes a network where neither --budget nor --epochs is given: hours for everything on two cores."""
+"""Minutes per network where neither --budget nor --epochs is given: hours for everything on two cores."""
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
+KIND = "Kind of part. Repeatable. Default: all."
+DROPOUT = "Dropout probability; 0.5 in the paper."
+VARIANT = "Variant of the network."
+
 
 def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The options that all commands have; `data` says what --data names."""
+    """Decorator that adds the options of all commands; data : help of --data."""
     options = [
         click.option("--data", type=click.Path(path_type=Path), required=True, metavar="PATH", help=data),
-        click.option("--budget", type=click.FloatRange(0, min_open=True), metavar="MIN", help="Minutes a network."),
-        click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True),
-        click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True),
+        click.option("--budget", type=click.FloatRange(0, min_open=True), metavar="MIN", help="Minutes per network."),
+        click.option(
+            "--seed",
+            type=click.IntRange(0, 2**31 - 1),
+            default=0,
+            show_default=True,
+            metavar="N",
+            help="Seed of all random choices.",
+        ),
+        click.option(
+            "--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True, help="Device."
+        ),
         click.option(
             "-o",
             "--output",
@@ -48,7 +61,7 @@ def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
             type=FOLDER,
             required=True,
             metavar="OUT",
-            help="Folder for weights, logs and checkpoints; a run that was cut off goes on there.",
+            help="Output folder for weights, logs and checkpoints; an interrupted run resumes there.",
         ),
     ]
 
@@ -61,29 +74,31 @@ def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
 
 
 def kinds(command: Callable[..., None]) -> Callable[..., None]:
-    """The option --kind."""
-    option = click.option("--kind", "chosen", type=click.Choice(KINDS), multiple=True, help="Repeatable; default: all.")
+    """Decorator that adds the option --kind."""
+    option = click.option("--kind", "chosen", type=click.Choice(KINDS), multiple=True, help=KIND)
     return option(command)
 
 
 @click.group()
 def train() -> None:
-    """Train the networks; each command resumes what it finds in OUT."""
+    """Train the networks. Each command resumes an interrupted run in OUT."""
 
 
 @train.command()
-@common("The pack, or the folder that holds pack.npz.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Passes of 100,000 figures, instead of minutes.")
-@click.option("--joints", type=click.Choice(["16", "21"]), default="21", show_default=True)
-@click.option("--perspective", is_flag=True, help="Perspective drawings: predict x and y too.")
-@click.option("--visibility", is_flag=True, help="Which joints are hidden is an input.")
-@click.option("--limbs/--no-limbs", default=True, show_default=True, help="How foreshortened limbs are is an input.")
-@click.option("--dropout", type=click.FloatRange(0, 0.9), default=0.1, show_default=True, help="The paper: 0.5.")
-@click.option("--metric", is_flag=True, help="Trust the drawing's units, as the paper does.")
-@click.option("--plain", is_flag=True, help="Bodies as they are, from all around: the paper's protocol.")
-@click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N")
+@common("Pack, or folder that contains pack.npz.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 100,000 figures, instead of --budget.")
+@click.option("--joints", type=click.Choice(["16", "21"]), default="21", show_default=True, help="Number of joints.")
+@click.option("--perspective", is_flag=True, help="Train on perspective drawings; also predict x and y.")
+@click.option("--visibility", is_flag=True, help="Use the visibility of joints as an input.")
+@click.option(
+    "--limbs/--no-limbs", default=True, show_default=True, help="Use the foreshortening of limbs as an input."
+)
+@click.option("--dropout", type=click.FloatRange(0, 0.9), default=0.1, show_default=True, help=DROPOUT)
+@click.option("--metric", is_flag=True, help="Use the units of the drawing, as the paper does.")
+@click.option("--plain", is_flag=True, help="Train on unaugmented bodies from all sides, as the paper does.")
+@click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N", help="Batch size.")
 def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, **given: Any) -> None:
-    """Depths of joints (table 1)."""
+    """Train the network for the depths of joints (table 1)."""
     from fig2mesh.nets.pose_lift import PoseLiftShape
     from fig2mesh.training.networks.train_pose import pack_skeletons, train_pose
 
@@ -106,17 +121,17 @@ def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device
         augment=not given["plain"],
         dropout=given["dropout"],
     )
-    _say({name: value for name, value in scores.items() if "_mean_" not in name})
+    _print_scores({name: value for name, value in scores.items() if "_mean_" not in name})
 
 
 @train.command()
 @common("Folder of shards.")
 @kinds
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
 def size(
     data: Path, out: Path, budget: float | None, epochs: int | None, device: str, chosen: tuple[str, ...], seed: int
 ) -> None:
-    """Sizes of parts."""
+    """Train the networks for the sizes of parts."""
     from fig2mesh.training.networks.train_size import train_size
 
     for kind in chosen or KINDS:
@@ -127,16 +142,18 @@ def size(
             out / f"size-{kind}",
             _schedule("size", budget, epochs, seed, device=_device(device)),
         )
-        _say(scores)
+        _print_scores(scores)
 
 
 @train.command()
 @common("Folder of shards.")
 @kinds
-@click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True)
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Times that each part is seen in each view.")
+@click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True, help=VARIANT)
+@click.option(
+    "--epochs", type=click.IntRange(1), metavar="N", help="Passes over each part in each view, instead of --budget."
+)
 @click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
-@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run in DIR/disn-….")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Initialise with the weights of an earlier run in DIR/disn-….")
 def parts(
     data: Path,
     out: Path,
@@ -149,7 +166,7 @@ def parts(
     lr: float,
     init: Path | None,
 ) -> None:
-    """Shapes of parts (tables 2 and 3)."""
+    """Train the networks for the shapes of parts (tables 2 and 3)."""
     from fig2mesh.nets.disn import DisnShape
     from fig2mesh.training.networks.train_parts import train_parts
 
@@ -169,15 +186,15 @@ def parts(
             ),
             epochs=epochs,
         )
-        _say(scores)
+        _print_scores(scores)
 
 
 @train.command()
 @common("Folder of shards with pictures.")
-@click.option("--masks/--no-masks", default=True, show_default=True, help="Part masks are an input.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--masks/--no-masks", default=True, show_default=True, help="Use part masks as an input.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
 @click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
-@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Initialise with the weights of an earlier run.")
 def uv(
     data: Path,
     out: Path,
@@ -189,65 +206,67 @@ def uv(
     lr: float,
     init: Path | None,
 ) -> None:
-    """Texture coordinates (table 4)."""
+    """Train the network for texture coordinates (table 4)."""
     from fig2mesh.nets.uv_unet import UvUnetShape
     from fig2mesh.training.networks.train_uv import train_uv
 
     schedule = _schedule("uv", budget, epochs, seed, rate=lr, device=_device(device), init=init)
-    _say(train_uv(data, out, schedule, UvUnetShape(masks)))
+    _print_scores(train_uv(data, out, schedule, UvUnetShape(masks)))
 
 
 @train.command()
 @common("Folder of shards with pictures.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
 def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int) -> None:
-    """Where unseen texels take their colours."""
+    """Train the network that chooses the source of each unseen texel's colour."""
     from fig2mesh.training.networks.train_fill import train_fill
 
-    _say(train_fill(data, out, _schedule("fill", budget, epochs, seed, device=_device(device))))
+    _print_scores(train_fill(data, out, _schedule("fill", budget, epochs, seed, device=_device(device))))
 
 
 def filled(command: Callable[..., None]) -> Callable[..., None]:
-    """The option --fill."""
-    return click.option("--fill", type=FOLDER, required=True, metavar="DIR", help="What `train fill` made.")(command)
+    """Decorator that adds the option --fill."""
+    return click.option("--fill", type=FOLDER, required=True, metavar="DIR", help="Output folder of `train fill`.")(
+        command
+    )
 
 
 @train.command()
 @common("Folder of shards with pictures.")
 @filled
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
 def refine(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
-    """Details of unseen sides."""
+    """Train the network for details of unseen sides."""
     from fig2mesh.training.networks.train_refine import train_refine
 
     _check_cpu(device)
-    _say(train_refine(data, fill, out, _schedule("refine", budget, epochs, seed)))
+    _print_scores(train_refine(data, fill, out, _schedule("refine", budget, epochs, seed)))
 
 
 @train.command()
 @common("Folder of shards with pictures.")
 @filled
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
 def head(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
-    """Heads of unseen sides."""
+    """Train the network for unseen sides of heads."""
     from fig2mesh.training.networks.train_refine import train_head
 
     _check_cpu(device)
-    _say(train_head(data, fill, out, _schedule("head", budget, epochs, seed)))
+    _print_scores(train_head(data, fill, out, _schedule("head", budget, epochs, seed)))
 
 
 @train.command()
 @common("Folder of crops.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Thousands of steps, instead of minutes.")
+@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
 @click.option("--lr", type=click.FloatRange(0, min_open=True), default=1e-3, show_default=True, help="Learning rate.")
-@click.option("--init", type=FOLDER, metavar="DIR", help="Start from the weights of an earlier run.")
+@click.option("--init", type=FOLDER, metavar="DIR", help="Initialise with the weights of an earlier run.")
 @click.option(
     "--blazepose",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="TFLITE",
-    help="Start the encoder from pose_landmark_full.tflite; docs/parsing.md says where it is from.",
+    help="Initialise the encoder with pose_landmark_full.tflite; for its source see docs/parsing.md.",
 )
-@click.option("--whole", is_flag=True, help="Train the encoder's first stages too.")
+@click.option("--whole", is_flag=True, help="Also train the first stages of the encoder.")
 def parse(
     data: Path,
     out: Path,
@@ -260,16 +279,16 @@ def parse(
     blazepose: Path | None,
     whole: bool,
 ) -> None:
-    """Silhouette, parts and joints from a bare picture."""
+    """Train the network that finds silhouette, parts and joints in a picture."""
     from fig2mesh.training.networks.train_parse import train_parse
 
     _check_cpu(device)
     schedule = _schedule("parse", budget, epochs, seed, rate=lr, init=init)
-    _say(train_parse(data, out, schedule, blazepose=blazepose, whole=whole))
+    _print_scores(train_parse(data, out, schedule, blazepose=blazepose, whole=whole))
 
 
 def _schedule(network: str, budget: float | None, epochs: int | None, seed: int, **given: Any) -> Schedule:
-    """The schedule of a network whose epochs are thousands of steps; given : further fields."""
+    """Schedule of a network whose epochs are 1,000 steps; given : further fields."""
     steps = None if epochs is None else 1000 * epochs
     return Schedule(_minutes(network, budget, epochs), steps, seed, **given)
 
@@ -282,7 +301,7 @@ def _device(name: str) -> str:
     import torch
 
     if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("--device cuda", "no CUDA device is here", "use --device cpu")
+        raise InputError("--device cuda", "no CUDA device found", "use --device cpu")
     if name == "auto":
         return "cuda" if torch.cuda.is_available() else "cpu"
     return name
@@ -299,6 +318,6 @@ def _pack(data: Path) -> Pack:
     return load_pack(data / "pack.npz" if data.is_dir() else data)
 
 
-def _say(scores: dict[str, float]) -> None:
+def _print_scores(scores: dict[str, float]) -> None:
     for name, value in scores.items():
         click.echo(f"  {name}: {value:.4g}")

@@ -1,6 +1,6 @@
-"""`fig2mesh evaluate figures`: every drawing of a folder through the main job, and all measures of what came out.
+"""`fig2mesh evaluate figures`: convert every drawing of a folder and take all measures of the models.
 
-The models are made 1.79 m high, as the limits of the measures are meant, and not written.
+The models are 1.79 m high, the height for which the thresholds of the measures are defined, and are not written.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from fig2mesh.stages.solid import solid
 
 LEVELS = 3
 COARSE = 5000
-"""Triangles of a further level, the same for every quality: what a map with hundreds of figures can afford."""
+"""Triangles of an additional level, the same for every quality, for maps with hundreds of figures."""
 
 Log = Callable[[str], None]
 Facts = dict[str, float | int | bool]
@@ -48,13 +48,13 @@ class Drawing:
     mask: Path | None
 
     def arguments(self) -> dict[str, Any]:
-        """Of `read_figure`."""
+        """Arguments of `read_figure`."""
         return {"path": self.image, "mask": self.mask, "keypoints": self.keypoints, "name": self.name}
 
 
 @dataclass(frozen=True)
 class FigureRow:
-    """What came of one drawing: facts by the keys of `COLUMNS`, or the one line that says why there are none."""
+    """Result for one drawing: values by the keys of `COLUMNS`, or the reason of the failure in one line."""
 
     name: str
     facts: Facts
@@ -63,7 +63,7 @@ class FigureRow:
 
 @dataclass(frozen=True)
 class Column:
-    """One measure in the table: its key, heading, factor and format, and which end is the worse one."""
+    """One measure in the table: its key, heading, factor and format, and which extreme is the worst."""
 
     key: str
     title: str
@@ -105,7 +105,7 @@ COLUMNS = (
 def find_drawings(folder: Path) -> tuple[Drawing, ...]:
     """Figures of a folder by name: folders with image.png, and pairs of NAME.png and NAME.json (NAME_mask.png)."""
     if not folder.is_dir():
-        raise InputError(folder, "no such folder", "name a folder of figures")
+        raise InputError(folder, "no such directory", "name a folder of figures")
     found = []
     for path in sorted(folder.iterdir()):
         if path.is_dir() and (path / "image.png").exists():
@@ -120,7 +120,7 @@ def find_drawings(folder: Path) -> tuple[Drawing, ...]:
 
 
 def drawing_in(folder: Path) -> Drawing:
-    """The figure that a folder of image.png, keypoints.json and, where needed, mask.png is."""
+    """Drawing in a folder with image.png, keypoints.json and, where needed, mask.png."""
     mask = folder / "mask.png"
     return Drawing(folder.name, folder / "image.png", folder / "keypoints.json", mask if mask.exists() else None)
 
@@ -128,7 +128,7 @@ def drawing_in(folder: Path) -> Drawing:
 def evaluate_figures(
     drawings: tuple[Drawing, ...], settings: Settings, log: Log = lambda line: None
 ) -> list[FigureRow]:
-    """Make and measure a model of each drawing; what fails is told in its row and the others go on."""
+    """Make and measure a model of each drawing; a failure is reported in its row and does not stop the others."""
     rows = []
     for number, drawing in enumerate(drawings, 1):
         log(f"{number} of {len(drawings)}: {drawing.name}")
@@ -136,13 +136,13 @@ def evaluate_figures(
             rows.append(FigureRow(drawing.name, measure_drawing(drawing, settings)))
         except InputError as error:
             rows.append(FigureRow(drawing.name, {}, " ".join(str(error).split())))
-        except Exception as error:  # Whatever breaks one figure is a finding about that figure.
+        except Exception as error:  # Any error of one figure is a result for that figure.
             rows.append(FigureRow(drawing.name, {}, f"{type(error).__name__}: {' '.join(str(error).split())}"))
     return rows
 
 
 def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
-    """All measures of one drawing's model, by the keys of `COLUMNS`."""
+    """Measures of one drawing's model, by the keys of `COLUMNS`."""
     figure = read_figure(**drawing.arguments())
     settings = replace(settings, lods=LEVELS)
     done = run_stages(figure, settings, (lift, solid, simplify, model), height_m=FIGURE_HEIGHT)
@@ -187,7 +187,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
 
 
 def summary(rows: list[FigureRow]) -> tuple[Facts, Facts]:
-    """Median and worst of each measure over the figures that have one; for counts and laws too."""
+    """Median and worst value of each measure over the figures with a model."""
     median: Facts = {}
     worst: Facts = {}
     for column in COLUMNS:
@@ -201,7 +201,7 @@ def summary(rows: list[FigureRow]) -> tuple[Facts, Facts]:
 
 
 def as_markdown(rows: list[FigureRow]) -> str:
-    """A table with a line for each figure, then median and worst; figures without a model have their reason."""
+    """Markdown table with a row for each figure, or the reason of its failure, then median and worst."""
     lines = [
         "| figure | " + " | ".join(column.title for column in COLUMNS) + " |",
         "|---|" + "---:|" * len(COLUMNS),
@@ -218,7 +218,7 @@ def as_markdown(rows: list[FigureRow]) -> str:
 
 
 def as_json(rows: list[FigureRow]) -> str:
-    """The same facts unrounded: lengths in mm, shares as fractions."""
+    """JSON of the same values, unrounded: lengths in mm, shares as fractions."""
     median, worst = summary(rows)
     figures: dict[str, Any] = {row.name: row.facts or {"failure": row.failure} for row in rows}
     return json.dumps({"figures": figures, "median": median, "worst": worst}, indent=2, allow_nan=False) + "\n"

@@ -1,4 +1,4 @@
-"""One picture of a scene: rays, then for the points they meet what the request needs, and nothing else."""
+"""Rendering of one picture of a scene: camera rays, then, for the points they hit, only what the request needs."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ from fig2mesh.render.visible import UP, VisiblePoints, to_ground, visible_points
 from fig2mesh.skeleton import PART_COLOURS
 
 RAYS_AT_ONCE = 1 << 19
-"""Pictures are made in bands of rows with so many rays: some 100 MB."""
+"""Rays per band of rows: some 100 MB."""
 
 AO_REACH = 0.25
-"""What is further away shades nothing, share of the figure's height."""
+"""Range of ambient occlusion, share of the figure's height."""
 
 
 @dataclass(frozen=True)
 class PictureRequest:
-    """What a picture shows.
+    """Parameters of a picture.
 
-    effects : names, see `fig2mesh.render.effects`; smooth-union is a matter of the scene
+    effects : names, see `fig2mesh.render.effects`; smooth-union is part of the scene
     size : (width, height) pixels
-    yaw_deg, pitch_deg : where the camera stands, see `fig2mesh.field.camera`
+    yaw_deg, pitch_deg : direction of the camera, see `fig2mesh.field.camera`
     samples : rays along each side of a pixel
     background : sRGB; None: transparent
-    ground : a disc under the feet
+    ground : whether to show a disc under the feet
     sun : (3,) unit vector towards the sun in the scene's axes; None: it is below the horizon
     outline_px, outline_colour : width in pixels and sRGB of ink lines
     """
@@ -70,14 +70,14 @@ class PictureRequest:
 
 @dataclass(frozen=True)
 class RenderedPicture:
-    """rgba : (H, W, 4) uint8 sRGB, straight alpha; counts : what it took."""
+    """rgba : (H, W, 4) uint8 sRGB, straight alpha; counts : of the work."""
 
     rgba: ByteArray
     counts: Counts
 
 
 def view_of(scene: Scene, request: PictureRequest) -> CameraView:
-    """The camera of a request; turning alone neither moves nor zooms it."""
+    """Camera of a request; a change of yaw neither moves nor zooms it."""
     return make_view(
         scene.bounds,
         request.size,
@@ -89,12 +89,12 @@ def view_of(scene: Scene, request: PictureRequest) -> CameraView:
 
 
 def render(scene: Scene, request: PictureRequest) -> RenderedPicture:
-    """A picture of a scene. Same scene, same request: same bytes."""
+    """Render a picture of a scene. The same scene and request give the same bytes."""
     need = needs(request.mode, request.effects, fields=isinstance(scene, FieldScene))
     view = view_of(scene, request)
     width, height = request.size
-    fine = replace(view, camera=replace(view.camera, size=(width * request.samples, height * request.samples)))
-    # Lines of one band reach into the next: a border of rows is drawn with each, and cut off again.
+    sampled = replace(view, camera=replace(view.camera, size=(width * request.samples, height * request.samples)))
+    # Lines of one band extend into the next: a border of rows is rendered with each band, and cropped.
     border = math.ceil(request.outline_px / 2) + 2 if need.edges else 0
     rows = max(1, RAYS_AT_ONCE // (width * request.samples**2) - 2 * border)
     result = np.empty((height, width, 4), np.float32)
@@ -102,7 +102,7 @@ def render(scene: Scene, request: PictureRequest) -> RenderedPicture:
     for first in range(0, height, rows):
         last = min(first + rows, height)
         band = (max(first - border, 0), min(last + border, height))
-        rgba, spent = _band(scene, request, need, fine, (band[0] * request.samples, band[1] * request.samples))
+        rgba, spent = _band(scene, request, need, sampled, (band[0] * request.samples, band[1] * request.samples))
         pixels = rgba.reshape(band[1] - band[0], request.samples, width, request.samples, 4).mean(axis=(1, 3))
         result[first:last] = pixels[first - band[0] : last - band[0]]
         counts += spent
@@ -112,7 +112,7 @@ def render(scene: Scene, request: PictureRequest) -> RenderedPicture:
 def _band(
     scene: Scene, request: PictureRequest, need: Needs, view: CameraView, rows: tuple[int, int]
 ) -> tuple[Floats, Counts]:
-    """(rows, W, 4) premultiplied colours 0-255 and coverage, one for every ray of the rows."""
+    """(rows, W, 4) premultiplied colours 0-255 and coverage of the rays of some rows."""
     visible, counts = visible_points(scene, view.camera, rows, need, with_ground=request.ground)
     colours, spent = _colours(scene, request, need, view, visible)
     counts += spent
@@ -133,7 +133,7 @@ def _band(
 def _colours(
     scene: Scene, request: PictureRequest, need: Needs, view: CameraView, visible: VisiblePoints
 ) -> tuple[Floats, Counts]:
-    """(M, 3) sRGB 0-255 of the points before any light."""
+    """(M, 3) sRGB 0-255 of the points, unlit."""
     counts = Counts()
     if request.mode == "depth":
         _, directions = visible.camera.lines(visible.pixels, visible.rows[0])
@@ -174,7 +174,7 @@ def _light(scene: Scene, request: PictureRequest, need: Needs, visible: VisibleP
         lamp, fill = None if request.sun is None else np.array(request.sun, np.float64), UP
     reached = np.ones(len(normals))
     if need.shadow and lamp is not None:
-        # What is turned away from the lamp is dark already.
+        # Points that face away from the lamp are dark already.
         turned = np.flatnonzero(normals @ lamp > 0)
         reached[turned] = ~scene.blocked(start[turned], np.broadcast_to(lamp, (len(turned), 3)))
         counts += Counts(shadow_rays=len(turned))
@@ -202,7 +202,7 @@ def _ink(scene: Scene, request: PictureRequest, visible: VisiblePoints) -> Float
     """(rows, W) share of each pixel that ink lines cover."""
     count = visible.shape[0] * visible.shape[1]
     kinds = np.zeros(count, np.int16)
-    # The rim of the ground is no line of the figure: ground and nothing are one kind.
+    # The rim of the ground is not a line of the figure, so ground and background have the same label.
     kinds[visible.pixels[visible.figure]] = visible.surface.labels.astype(np.int16) + 1
     places, ways = np.zeros((count, 3)), np.zeros((count, 3))
     places[visible.pixels], ways[visible.pixels] = visible.points, visible.normals

@@ -1,4 +1,4 @@
-"""Points that a picture shows: of the figure, and of the ground below it."""
+"""Visible points of a picture: of the figure, and of the ground below it."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ UP = np.array([0.0, 1.0, 0.0])
 
 @dataclass(frozen=True)
 class VisiblePoints:
-    """M points seen by the pixels of some rows of a picture, in the order of the pixels.
+    """M points visible in some rows of a picture, in the order of the pixels.
 
-    camera : of the whole picture; rows : the first, and the first of those that follow
-    surface : what of the figure is met
-    pixels : (M,) that see something, counted from the first of `rows`
+    camera : of the whole picture; rows : first, and one past the last
+    surface : hits on the figure
+    pixels : (M,) indices of the pixels that show them, counted from the first of `rows`
     ground : (M,) bool, on the ground; the others lie on the figure
     depth : (M,) along the rays
     points, normals : (M, 3), or (0, 3) where they are not needed
@@ -51,7 +51,7 @@ class VisiblePoints:
 def visible_points(
     scene: Scene, camera: Camera, rows: tuple[int, int], needs: Needs, *, with_ground: bool
 ) -> tuple[VisiblePoints, Counts]:
-    """The figure and, if asked for, the ground, as a camera sees them."""
+    """Points of the figure and, if requested, of the ground that are visible to a camera."""
     surface, counts = scene.meet(camera, rows, needs)
     depth = surface.depth.astype(np.float64)
     hit = np.isfinite(depth)

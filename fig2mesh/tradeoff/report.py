@@ -1,4 +1,4 @@
-"""The sweep as CSV, plots and a page."""
+"""Report of a sweep as CSV, plots and a page."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ COLUMNS: Final = (
 
 
 CROWD: Final = 0.15
-"""Natural logarithm of the ratio of errors below which a run is close to the standard preset."""
+"""Threshold of the natural logarithm of the ratio of errors for a run to be close to the standard preset."""
 
 
 def rows(figure: str, found: Sequence[MeasuredRun]) -> list[dict[str, Any]]:
-    """A row of the table for each run; numbers that there are none of are left empty."""
+    """Rows of the table, one per run; missing numbers are empty."""
     return [
         {
             "figure": figure,
@@ -63,7 +63,7 @@ def as_csv(table: Sequence[dict[str, Any]]) -> str:
 
 
 def summary(figure: str, found: Sequence[MeasuredRun], tolerances: Sequence[Tolerance], machine: str) -> str:
-    """The page of one figure, Markdown: the knee, the presets, every knob."""
+    """Page of one figure, Markdown: the knee, the presets, every knob."""
     front, best = _front(found)
     named = [_name(found[i]) for i in front]
     chosen = found[front[best]]
@@ -98,8 +98,8 @@ def summary(figure: str, found: Sequence[MeasuredRun], tolerances: Sequence[Tole
 
 
 def _front(found: Sequence[MeasuredRun]) -> tuple[list[int], int]:
-    """Indices of the runs on the Pareto front, and which of them is the knee; models without colours are another
-    product, and the finest has no error by definition."""
+    """Indices of the runs on the Pareto front, and which of them is the knee; models without colours are excluded
+    as another product, and the finest because it has no error by definition."""
     rivals = [m.run.knob != "finest" and (m.run.knob, m.run.value) != ("textures", "none") for m in found]
     costs = [m.run.total_s if rival else np.nan for m, rival in zip(found, rivals, strict=True)]
     errors = [m.chamfer_mm for m in found]
@@ -113,7 +113,7 @@ def _name(measured: MeasuredRun) -> str:
 
 
 def plot(found: Sequence[MeasuredRun], folder: Path, figure: str) -> None:
-    """Two pictures: error against seconds with the front, and each knob by itself."""
+    """Write two plots: error against seconds with the front, and each knob separately."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -137,7 +137,7 @@ def _plot_front(found: Sequence[MeasuredRun], path: Path) -> None:
         axes.scatter(
             m.run.total_s, m.chamfer_mm, s=60 if preset else 18, color="tab:red" if preset else "tab:blue", zorder=2
         )
-        # What lies beside the standard preset would only hide it.
+        # Labels close to the standard preset would only hide it.
         apart = abs(np.log(m.chamfer_mm / standard.chamfer_mm)) > CROWD
         if preset or apart or i in front:
             weight = "bold" if preset or i == front[best] else "normal"
@@ -191,7 +191,7 @@ def _plot_knobs(found: Sequence[MeasuredRun], path: Path) -> None:
 
 
 def _order(value: str) -> tuple[float, str]:
-    """Numbers by size, coarse or small first as they come; words after them."""
+    """Sort key: numbers by size, then words."""
     try:
         return float(value), ""
     except ValueError:
