@@ -62,6 +62,8 @@ class MainJobGroup(click.Group):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if args[:1] == ["help"] and not os.path.exists("help"):
             args = [*args[1:], "--help"]
+            if args[0] not in (*self.commands, "--help"):
+                raise click.UsageError(_unknown(args[0], self.commands))
         _check_command(args, self.commands)
         # Options of the main command may come before the figure; the group itself only knows these two.
         if args and args[0] not in (*self.commands, "-h", "--help", "--version"):
@@ -128,8 +130,13 @@ def _check_command(args: Sequence[str], commands: Collection[str]) -> None:
     followed = len(args) > 1 and not args[1].startswith("-")
     if suffix and not followed:
         return
-    if near := difflib.get_close_matches(word, commands, 1):
-        raise click.UsageError(f"unknown command {args[0]!r:.80} (did you mean {near[0]!r}?)")
+    if difflib.get_close_matches(word, commands, 1):
+        raise click.UsageError(_unknown(args[0], commands))
+
+
+def _unknown(word: str, commands: Collection[str]) -> str:
+    near = difflib.get_close_matches(os.path.splitext(word)[0], commands, 1)
+    return f"unknown command {word!r:.80}" + (f" (did you mean {near[0]!r}?)" if near else "")
 
 
 def main(arguments: list[str] | None = None) -> int:
