@@ -15,7 +15,7 @@ from PIL import Image, ImageDraw, ImageFont
 from fig2mesh.mesh.preview import LIGHT
 from fig2mesh.parse.read import read_figure
 from fig2mesh.render.job import field_scene
-from fig2mesh.render.picture import Request, render
+from fig2mesh.render.picture import PictureRequest, render
 from fig2mesh.render.sun import parse_time, sun_at, towards_sun
 from fig2mesh.settings import PRESETS
 
@@ -48,10 +48,10 @@ def sheet() -> Image.Image:
     """All cells in reading order, each with what it shows written above."""
     figure = read_figure(FIGURE / "image.png", keypoints=FIGURE / "keypoints.json")
     scene, smooth = (
-        field_scene(figure, PRESETS["standard"], Request("textured", effects))
+        field_scene(figure, PRESETS["standard"], PictureRequest("textured", effects))
         for effects in (frozenset(), frozenset(["smooth-union"]))
     )
-    plain = Request(size=CELL, samples=3, background=LIGHT)
+    plain = PictureRequest(size=CELL, samples=3, background=LIGHT)
     sun = towards_sun(sun_at(*LONLAT, parse_time(AFTERNOON)), 180.0)
     rows = -(-len(CELLS) // COLUMNS)
     page = Image.new("RGB", (COLUMNS * CELL[0], rows * (CELL[1] + LABEL)), LIGHT)

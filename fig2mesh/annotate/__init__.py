@@ -1,1 +1,1 @@
-"""Correcting by hand what was found in a drawing: joints, silhouette, parts, which limbs are in front."""
+"""Manual annotation of a drawing: joints, silhouette, part labels, depth order of limbs."""

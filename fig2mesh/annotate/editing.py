@@ -1,4 +1,4 @@
-"""What the page and the program send each other: a JSON head, and a byte for each pixel."""
+"""Messages between the page and the server: a JSON header, and a byte per pixel."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from fig2mesh.records import BoolArray, ByteArray, FloatArray
 from fig2mesh.skeleton import BONES, JOINT_NAMES, LABEL_COLOURS, LIMBS, PART_NAMES, STANDING, without_side
 
 INSIDE = 128
-"""This bit of a pixel's byte says that it is in the silhouette; the lower ones are its part label."""
+"""Bit of a pixel's byte that is set inside the silhouette; the lower bits are its part label."""
 
-MOST_PIXELS = 40_000_000
-"""Browsers do not draw on larger canvases."""
+MAX_PIXELS = 40_000_000
+"""Browsers do not support larger canvases."""
 
 
 @dataclass(frozen=True)
-class Subject:
+class AnnotatedPicture:
     """A drawing that is being annotated.
 
-    rgba : (H, W, 4) of the part of the picture that is shown; corner : (x, y) of its corner in the picture
+    rgba : (H, W, 4) of the part of the picture that is shown; corner : (x, y) of its top left corner in the picture
     size : (width, height) of the whole picture; picture : its file name
     """
 
@@ -46,22 +46,22 @@ def begin(
     keypoints: Path | None,
     part_labels: Path | None,
     bbox: tuple[int, int, int, int] | None,
-) -> tuple[Subject, Annotation]:
-    """A drawing and what is known of it, in IMAGE pixels of the part that is shown.
+) -> tuple[AnnotatedPicture, Annotation]:
+    """Read a drawing and its annotation, in IMAGE pixels of the part that is shown.
 
-    What no file says is inferred from the picture; where no figure is seen in it, it is nothing for a silhouette, and a
-    standing person for joints. Raises FigureError as `fig2mesh.parse.read.read_figure` does.
+    Anything that no file provides is inferred from the picture; if no figure is found in it, the silhouette is empty
+    and the joints are those of a standing person. Raises FigureError as `fig2mesh.parse.read.read_figure` does.
     """
     view = read_view(path, bbox)
     height, width = view.rgba.shape[:2]
-    if height * width > MOST_PIXELS:
-        raise FigureError(path, f"{width}×{height} px is too much for a page", "pass --bbox round the figure")
-    subject = Subject(path.stem, path.name, view.rgba, view.corner, view.size)
+    if height * width > MAX_PIXELS:
+        raise FigureError(path, f"{width}×{height} px is too large for a page", "give --bbox round the figure")
+    subject = AnnotatedPicture(path.stem, path.name, view.rgba, view.corner, view.size)
     silhouette = read_mask(mask, view)
     labels = np.zeros((height, width), np.uint8) if part_labels is None else read_labels(part_labels, view)
     given = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
     if silhouette is None or given is None:
-        # torch takes seconds to load: only pictures without mask or joints pay for it.
+        # torch takes seconds to load, so it is imported only for pictures without mask or joints.
         from fig2mesh.parse.infer import infer_figure
 
         usable = silhouette is None or bool(silhouette.any())
@@ -76,27 +76,27 @@ def begin(
 
 
 def standing(mask: BoolArray) -> FloatArray:
-    """(21, 2) joints of a person that stands as high as the silhouette, or as the picture where there is none."""
+    """(21, 2) joints of a standing person as high as the silhouette, or as the picture if it is empty."""
     rows, columns = np.nonzero(mask) if mask.any() else np.nonzero(np.ones_like(mask))
     top, height, middle = rows.min(), np.ptp(rows) + 1, (columns.min() + columns.max() + 1) / 2
     joints = []
     for name in JOINT_NAMES:
         x, y = STANDING[without_side(name)]
-        # The figure looks at the viewer: its left is on the right.
+        # The figure faces the viewer: its left is on the right.
         joints.append((middle + (-x if name.startswith("r_") else x) * height, top + y * height))
     limit = np.array([mask.shape[1], mask.shape[0]], np.float32)
     return np.clip(np.array(joints, np.float32), 0, limit)
 
 
-def packed(subject: Subject, annotation: Annotation) -> bytes:
-    """What the page starts with: head and pixels, see `unpacked`, and in the head what it must know besides."""
+def packed(subject: AnnotatedPicture, annotation: Annotation) -> bytes:
+    """Message for the page, see `unpacked`; its header also has names, colours and bones."""
     height, width = annotation.mask.shape
     rows = zip(JOINT_NAMES, annotation.joints_px.astype(float).tolist(), annotation.visible.tolist(), strict=True)
     head = {
         "name": subject.name,
         "width": width,
         "height": height,
-        "joints": {name: [*point, int(seen)] for name, point, seen in rows},
+        "joints": {name: [*point, int(visible)] for name, point, visible in rows},
         "depth_order": dict(annotation.depth_order),
         "parts": PART_NAMES,
         "colours": LABEL_COLOURS,
@@ -108,11 +108,11 @@ def packed(subject: Subject, annotation: Annotation) -> bytes:
     return struct.pack("<I", len(text)) + text + pixels.tobytes()
 
 
-def unpacked(message: bytes, subject: Subject) -> Annotation:
-    """The annotation that a page sends: 4 bytes with the length of the head, little-endian, the head in JSON, and a
-    byte for each pixel, row by row: `INSIDE` and the part label.
+def unpacked(message: bytes, subject: AnnotatedPicture) -> Annotation:
+    """Annotation in a message of the page: the length of the header (4 bytes, little-endian), the header in JSON, and a
+    byte per pixel, row by row: `INSIDE` and the part label.
 
-    Raises InputError for a message of another kind; never trusts what it holds.
+    The contents are not trusted: raises InputError for an invalid message.
     """
     height, width = subject.rgba.shape[:2]
     try:
@@ -138,4 +138,4 @@ def unpacked(message: bytes, subject: Subject) -> Annotation:
         annotation.figure(subject.name, subject.rgba)  # checks shapes and limbs
         return annotation
     except (struct.error, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError("the page", f"sent what is no annotation ({type(error).__name__})", "load it again") from None
+        raise InputError("the page", f"sent an invalid annotation ({type(error).__name__})", "reload it") from None

@@ -1,4 +1,4 @@
-"""`fig2mesh annotate`: read a drawing, show the page, save what is done there. All side effects are here."""
+"""`fig2mesh annotate`: read a drawing, serve the page, save the annotation. All side effects are here."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import logging
 import shlex
 from pathlib import Path
 
-from fig2mesh.annotate.editing import Subject, begin
+from fig2mesh.annotate.editing import AnnotatedPicture, begin
 from fig2mesh.annotate.request import AnnotateRequest
 from fig2mesh.annotate.server import annotation_server
 from fig2mesh.errors import FigureError, OutputError
@@ -25,13 +25,13 @@ PACKAGE = "fig2mesh.annotate"
 
 
 def run(request: AnnotateRequest) -> None:
-    """Do what `fig2mesh annotate` asks for."""
+    """Run `fig2mesh annotate`."""
     folder = request.folder
     if folder.exists() and not folder.is_dir():
-        raise OutputError(folder, "is a file", "name a folder")
+        raise OutputError(folder, "not a directory", "give -o a folder")
 
     def kept(given: Path | None, name: str) -> Path | None:
-        # What was saved before goes on, unless an option names another file.
+        # Resume from the files saved before, unless an option names another file.
         return given if given is not None else folder / name if (folder / name).is_file() else None
 
     mask, labels = kept(request.mask, MASK), kept(request.part_labels, PART_LABELS)
@@ -49,15 +49,15 @@ def run(request: AnnotateRequest) -> None:
     show(annotation_server(page(subject), subject, start, save, preview, request.port), request.open)
 
 
-def page(subject: Subject) -> str:
-    """The page of a drawing; picture and annotation it asks the server for."""
+def page(subject: AnnotatedPicture) -> str:
+    """HTML page of a drawing; it fetches picture and annotation from the server."""
     scripts = "\n".join(asset(f"{name}.js", PACKAGE) for name in ("document", "canvas", "page"))
     values = {"title": html.escape(subject.name), "style": asset("page.css", PACKAGE), "scripts": scripts}
     return filled("page.html", values, PACKAGE)
 
 
-def preview_page(subject: Subject, annotation: Annotation, parts: Parts) -> str:
-    """The page that shows the solid, of draft quality. Raises FigureError where there is none."""
+def preview_page(subject: AnnotatedPicture, annotation: Annotation, parts: Parts) -> str:
+    """HTML page of the model in draft quality. Raises FigureError if the silhouette is empty."""
     if not annotation.mask.any():
         raise FigureError(subject.picture, "the silhouette is empty", "paint it first")
     settings = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
@@ -65,7 +65,7 @@ def preview_page(subject: Subject, annotation: Annotation, parts: Parts) -> str:
 
 
 def main_job(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:
-    """The command that makes a model of what was saved."""
+    """Command line that converts the saved annotation to a model."""
     words = ["fig2mesh", str(figure)]
     for option, name in (("--keypoints", KEYPOINTS), ("--mask", MASK), ("--part-labels", PART_LABELS)):
         words += [option, str(folder / name)]

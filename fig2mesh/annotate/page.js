@@ -21,12 +21,12 @@ async function start() {
   let saved = drawing.revision;
   let pending = null;
 
-  drawing.head.parts.forEach((part, label) => find('part').append(new Option(part === 'none' ? 'as the outline tells' : part.replaceAll('_', ' '), label)));
+  drawing.head.parts.forEach((part, label) => find('part').append(new Option(part === 'none' ? 'from the outline' : part.replaceAll('_', ' '), label)));
   drawing.names.forEach((name) => find('joint').append(new Option(name.replaceAll('_', ' '), name)));
   for (const limb of drawing.head.limbs) {
     const choice = document.createElement('select');
     choice.id = limb;
-    for (const [text, value] of [['as the pose tells', ''], ['in front', 'front'], ['behind', 'behind']]) choice.append(new Option(text, value));
+    for (const [text, value] of [['from the pose', ''], ['in front', 'front'], ['behind', 'behind']]) choice.append(new Option(text, value));
     choice.addEventListener('change', () => edit('', () => {
       if (choice.value) drawing.order[limb] = choice.value;
       else delete drawing.order[limb];
@@ -47,7 +47,7 @@ async function start() {
 
   function changed() {
     update();
-    tell(drawing.revision === saved ? '' : 'not saved yet');
+    tell(drawing.revision === saved ? '' : 'unsaved changes');
     clearTimeout(pending);
     if (find('live').checked) pending = setTimeout(solid, LIVE_AFTER_MS);
   }
@@ -80,7 +80,7 @@ async function start() {
   }
 
   async function solid() {
-    tell('making the solid …');
+    tell('making the preview …');
     try {
       await send('preview');
       find('preview').hidden = false;

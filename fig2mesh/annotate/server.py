@@ -1,7 +1,7 @@
-"""The page's other end: hands out picture and annotation, saves what comes back, makes previews.
+"""Server of the annotation page: serves picture and annotation, saves changes, makes previews.
 
-It listens on the loopback address alone and answers only its own page: requests for another host name are refused (a
-name elsewhere may lead here), and what changes something needs a header that pages of others cannot send.
+It listens on the loopback address only and answers only its own page: requests with another host name are rejected (to
+prevent DNS rebinding), and requests that change something need a header that other sites cannot send.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from urllib.parse import urlsplit
 
 from PIL import Image
 
-from fig2mesh.annotate.editing import Subject, packed, unpacked
+from fig2mesh.annotate.editing import AnnotatedPicture, packed, unpacked
 from fig2mesh.errors import InputError
 from fig2mesh.parse.annotation import Annotation
 
 HEADER = "X-Fig2mesh"
-"""With a header of one's own a request of another page's script is asked for first, and we never consent."""
+"""A custom header makes browsers send a CORS preflight for requests from other sites, which is never approved."""
 
 HEAD_BYTES = 1 << 20
 
 
 @dataclass
 class _State:
-    """What the page gets when it is loaded again."""
+    """State that the page gets when it is reloaded."""
 
     annotation: Annotation
     preview: str = ""
@@ -37,26 +37,26 @@ class _State:
 
 def annotation_server(
     page: str,
-    subject: Subject,
+    subject: AnnotatedPicture,
     start: Annotation,
     save: Callable[[Annotation], str],
     preview: Callable[[Annotation], str],
     port: int = 0,
 ) -> ThreadingHTTPServer:
-    """A server for the page of one drawing; `serve_forever()` starts it.
+    """Make a server for the page of one drawing; `serve_forever()` starts it.
 
-    save : keeps an annotation and says where; preview : makes a page of one. Both may raise InputError, whose text the
-        page shows; they are never called at the same time
-    port : 0 takes a free one. Raises InputError where it is taken.
+    save : saves an annotation and returns a message; preview : makes a page of one. Both may raise InputError, whose
+        text the page shows; they are never called at the same time
+    port : 0 for a free one. Raises InputError if it is in use.
     """
     picture = io.BytesIO()
     Image.fromarray(subject.rgba).save(picture, "PNG", compress_level=1)
     height, width = subject.rgba.shape[:2]
-    largest = HEAD_BYTES + height * width
+    max_bytes = HEAD_BYTES + height * width
     working = threading.Lock()
     state = _State(start)
 
-    class Handler(BaseHTTPRequestHandler):
+    class AnnotationHandler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             if not self._is_for_us():
                 return
@@ -81,7 +81,7 @@ def annotation_server(
                 self.send_error(HTTPStatus.FORBIDDEN)
                 return
             length = self.headers.get("Content-Length", "")
-            if not length.isdecimal() or int(length) > largest:
+            if not length.isdecimal() or int(length) > max_bytes:
                 self.send_error(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
                 return
             try:
@@ -118,11 +118,11 @@ def annotation_server(
             self.wfile.write(content)
 
         def log_message(self, format: str, *args: object) -> None:
-            """Nothing: the terminal shows the address and what was saved."""
+            """Log nothing: the terminal shows only the address and saved files."""
 
     try:
-        server = ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        server = ThreadingHTTPServer(("127.0.0.1", port), AnnotationHandler)
     except OSError as error:
-        remedy = "choose another one, or leave it out"
+        remedy = "choose another port, or leave it out"
         raise InputError("--port", f"{port} cannot be used ({error.strerror})", remedy) from None
     return server

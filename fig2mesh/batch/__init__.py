@@ -1,1 +1,1 @@
-"""Map collections: many figures, one row of a table each."""
+"""Batch conversion of collections: many figures, one row of a table each."""

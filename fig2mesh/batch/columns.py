@@ -1,7 +1,7 @@
 """Columns of a collection as fields of requests.
 
-Every field of `fig2mesh.conversion.request.Request` is a column under its option's name, but for those that the batch
-chooses itself.
+Every field of `fig2mesh.conversion.request.Request` is a column under its option's name, except for those that the
+batch sets itself.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 PAIRS = {"lonlat": ("lon", "lat"), "at": ("x", "y")}
-"""Fields of two numbers, and the columns of one number each that make them."""
+"""Fields of two numbers, and the two columns that make up each."""
 
 OWN_COLUMNS = ("figure", "format", "date", *(column for pair in PAIRS.values() for column in pair))
-"""Columns that are not options of the main job."""
+"""Columns that are not options of the main command."""
 
 
 @cache
 def fields_by_column() -> dict[str, RequestField]:
-    """Field of each column that is an option of the main job."""
+    """Field of each column that is an option of the main command."""
     fields = request_fields(Request)
     return {field.name: field for field in fields if field.option.column and not field.option.argument}
 
@@ -35,7 +35,7 @@ def _refused() -> frozenset[str]:
 
 
 def shared_fields() -> list[RequestField]:
-    """Fields of which one value, given on the command line, can hold for all rows."""
+    """Fields whose value can be given on the command line for all rows."""
     return [field for field in fields_by_column().values() if field.option.shared]
 
 
@@ -45,7 +45,7 @@ def is_known(column: str) -> bool:
 
 
 def request_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: str) -> Request:
-    """What a row asks for.
+    """Request of a row.
 
     values : by column; defaults : by column, where the row has none; name : of the figure
 
@@ -53,7 +53,7 @@ def request_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: s
     """
     for column in values:
         if column in _refused():
-            raise InputError(f"column {column}", "is chosen by the batch", "remove the column")
+            raise InputError(f"column {column}", "is set by the batch", "remove the column")
     fields = fields_by_column()
     found = _without_other_place({column: defaults[column] for column in defaults if column in fields}, values)
     found |= {
@@ -72,14 +72,14 @@ def request_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: s
 
 
 def list_of(value: Any) -> tuple[str, ...]:
-    """Items of a list, or of a text in which spaces, commas or semicolons separate them."""
+    """Items of a list, or of a text separated by spaces, commas or semicolons."""
     if isinstance(value, tuple | list):
         return tuple(map(str, value))
     return tuple(str(value).replace(",", " ").replace(";", " ").split())
 
 
 def attributes_of(values: Mapping[str, Value]) -> dict[str, Value]:
-    """What a row says besides."""
+    """Values of a row that are not options."""
     return {column: value for column, value in values.items() if not (is_known(column) or column in _refused())}
 
 
@@ -92,13 +92,15 @@ def _pairs(values: Mapping[str, Value]) -> dict[str, Any]:
             raise InputError(f"column {missing}", "is empty", f"give both {pair[0]} and {pair[1]}")
         if given:
             if name in values:
-                raise InputError(f"column {name}", f"beside {pair[0]} and {pair[1]}", "give it once")
+                raise InputError(
+                    f"column {name}", f"cannot be combined with {pair[0]} and {pair[1]}", "give one of them"
+                )
             found[name] = parse_value(fields_by_column()[name], tuple(given), f"column {pair[0]}")
     return found
 
 
 def _without_other_place(defaults: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:
-    """The defaults without a place of the other kind than the row's: a row says it better."""
+    """Defaults without a place of another kind than the row's, which takes precedence."""
     if "lonlat" in values or "lon" in values or "lat" in values:
         return {column: value for column, value in defaults.items() if column not in ("map", "at")}
     if "map" in values:
@@ -107,5 +109,5 @@ def _without_other_place(defaults: dict[str, Any], values: Mapping[str, Value]) 
 
 
 def _column_of(source: str) -> str:
-    """What a message names: an option becomes the column of its name."""
+    """Source of a message: an option becomes the column of the same name."""
     return f"column {source[2:].replace('-', '_')}" if source.startswith("--") else source

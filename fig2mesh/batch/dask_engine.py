@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster. All machines see the files and the folder of the outputs under the same paths.
+"""Workers of a Dask cluster. All machines have the files and the output folder under the same paths.
 
 https://distributed.dask.org/en/stable/
 """
@@ -16,54 +16,54 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from fig2mesh.batch.engine import Stage, lost
+from fig2mesh.batch.engine import StageNotice, lost
 from fig2mesh.batch.ledger import WORK
 from fig2mesh.batch.row_job import check_row, convert_row
-from fig2mesh.batch.task import Batch, Outcome, Task
+from fig2mesh.batch.task import Batch, Outcome, RowTask
 from fig2mesh.errors import InputError
 
 TOPIC: Final = "fig2mesh"
 
 AHEAD: Final = 2
-"""Rows handed out for each thread of a worker: one to work on, one that waits, so that none has to ask."""
+"""Rows submitted per thread of a worker: one in work and one queued, so that no worker waits for the scheduler."""
 
 ANSWER_S: Final = 10.0
-"""How long a scheduler may take to answer at first."""
+"""Timeout for the first answer of the scheduler, seconds."""
 
 WORKERS_S: Final = 60.0
-"""How long to wait for the first worker."""
+"""Timeout for the first worker, seconds."""
 
-LOOK_S: Final = 5.0
-"""How often to look whether the scheduler is still there."""
+POLL_S: Final = 5.0
+"""Interval at which the connection to the scheduler is checked, seconds."""
 
 _one_at_a_time = threading.Lock()
-"""A worker with several threads gives them all to one row: memory is that of a row."""
+"""A worker with several threads uses them all for one row, so that its memory is that of one row."""
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What a worker says of itself.
+    """Facts about a worker.
 
-    code : `fig2mesh.conversion.keys.fingerprint`; sees : whether it sees the folder; threads : of torch
+    code : `fig2mesh.conversion.keys.fingerprint`; has_folder : whether it can access the output folder
+    threads : number of threads
     """
 
     code: str
-    sees: bool
+    has_folder: bool
     threads: int
 
 
 class DaskEngine:
-    """The workers of the scheduler at `address`; dry : rows are only checked.
+    """Workers of the scheduler at `address`; dry : rows are only checked.
 
-    Raises InputError where there is no scheduler or no worker, or a worker would make something else: another version,
-    or another disk.
+    Raises InputError where there is no scheduler or no worker, or where a worker has another version or another disk.
     """
 
     def __init__(self, batch: Batch, address: str, dry: bool = False) -> None:
         try:
             from distributed import Client
         except ImportError:
-            raise InputError("--engine dask", "not installed", 'run: pip install "fig2mesh[cluster]"') from None
+            raise InputError("--engine dask", "Dask is not installed", 'run: pip install "fig2mesh[cluster]"') from None
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._batch, self._dry = batch, dry
         self._address = address
@@ -93,7 +93,9 @@ class DaskEngine:
         finally:
             mark.unlink(missing_ok=True)
         if not found:
-            raise InputError(f"--address {self._address}", "it has no worker", f"run: dask worker {self._address}")
+            raise InputError(
+                f"--address {self._address}", "the scheduler has no workers", f"run: dask worker {self._address}"
+            )
         for worker, facts in found.items():
             if not isinstance(facts, Facts):
                 reason = " ".join(str(facts).split())[:120]
@@ -106,10 +108,10 @@ class DaskEngine:
                     "has another version of fig2mesh or of a library",
                     "install the same versions there",
                 )
-            if not facts.sees:
+            if not facts.has_folder:
                 raise InputError(
                     f"worker {worker}",
-                    f"does not see {self._batch.folder}",
+                    f"has no access to {self._batch.folder}",
                     "give -o DIR on a disk that all machines share, under the same path",
                 )
         self._threads: int = sum(facts.threads for facts in found.values())
@@ -119,13 +121,13 @@ class DaskEngine:
         """Threads of all workers."""
         return self._threads
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
-        """See `Engine.run`; stages are told by the scheduler's events."""
-        # Of Dask's futures that have ended, and of stages.
+    def run(self, tasks: Iterable[RowTask]) -> Iterator[Outcome | StageNotice]:
+        """See `Engine.run`; stages are reported through the scheduler's events."""
+        # Dask's finished futures, and notices of stages.
         notices: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._client.subscribe_topic(TOPIC, lambda event: notices.put(Stage(*event[1])))
+        self._client.subscribe_topic(TOPIC, lambda event: notices.put(StageNotice(*event[1])))
         waiting = iter(tasks)
-        given: dict[str, tuple[Task, Any]] = {}
+        given: dict[str, tuple[RowTask, Any]] = {}
 
         def give() -> None:
             for task in itertools.islice(waiting, AHEAD * max(self._threads, 1) - len(given)):
@@ -137,12 +139,12 @@ class DaskEngine:
             give()
             while given:
                 try:
-                    notice = notices.get(timeout=LOOK_S)
+                    notice = notices.get(timeout=POLL_S)
                 except queue.Empty:
                     if self._client.status != "running":
                         raise OSError(f"the connection is {self._client.status}") from None
                     continue
-                if isinstance(notice, Stage):
+                if isinstance(notice, StageNotice):
                     yield notice
                     continue
                 task, future = given.pop(notice.key)
@@ -154,7 +156,7 @@ class DaskEngine:
             reason = " ".join(str(error).split())[:120] or type(error).__name__
             raise InputError(
                 f"--address {self._address}",
-                f"the scheduler is lost ({reason})",
+                f"lost the connection to the scheduler ({reason})",
                 "start it and its workers, and run the same command again",
             ) from None
         finally:
@@ -162,12 +164,12 @@ class DaskEngine:
                 self._client.unsubscribe_topic(TOPIC)
             self._client.close()
 
-    def _submit(self, task: Task) -> Any:
+    def _submit(self, task: RowTask) -> Any:
         key = f"fig2mesh-{task.number}-{secrets.token_hex(4)}"
-        # Lower numbers first; a row whose worker is lost comes again before those that were never begun.
+        # Lower numbers first, so that a row whose worker was lost is retried before new rows.
         return self._client.submit(_row, self._batch, task, self._dry, key=key, pure=False, priority=-task.number)
 
-    def _outcome(self, future: Any, task: Task) -> Outcome:
+    def _outcome(self, future: Any, task: RowTask) -> Outcome:
         if future.status == "finished":
             found = future.result()
             assert isinstance(found, Outcome)
@@ -176,26 +178,26 @@ class DaskEngine:
             raise OSError(f"a row is {future.status}")
         error = future.exception()
         if type(error).__name__ == "KilledWorker":
-            return lost(task, "the workers that had it died; look at their logs")
+            return lost(task, "its workers died; see their logs")
         text = " ".join(str(error).split())[:200] or type(error).__name__
         return lost(task, f"lost by the cluster: {text}")
 
 
 def _facts(mark: str, dask_worker: Any) -> Facts:
-    """Runs on every worker; dask_worker : which one, given by Dask to functions with such a parameter."""
+    """Run on every worker; dask_worker : the worker, passed by Dask to functions with a parameter of this name."""
     from fig2mesh.conversion.keys import fingerprint
 
     return Facts(fingerprint(), os.path.exists(mark), dask_worker.state.nthreads)
 
 
-def _row(batch: Batch, task: Task, dry: bool) -> Outcome:
-    """One row in a worker of the cluster."""
+def _row(batch: Batch, task: RowTask, dry: bool) -> Outcome:
+    """Convert or check one row in a worker of the cluster."""
     from distributed import get_worker
 
     worker = get_worker()
 
     def advance(stage: str) -> None:
-        # A tuple of plain values: the scheduler keeps events, and knows nothing of our classes.
+        # A tuple of plain values: the scheduler stores events, and does not have our classes.
         worker.log_event(TOPIC, (str(worker.name), task.number, task.name, stage))
 
     with _one_at_a_time, _threads(worker.state.nthreads):
@@ -203,7 +205,7 @@ def _row(batch: Batch, task: Task, dry: bool) -> Outcome:
 
 
 def _threads(count: int) -> Any:
-    """Libraries compute on as many threads as the worker has."""
+    """Make libraries use as many threads as the worker has."""
     import numba
     import torch
     from threadpoolctl import threadpool_limits

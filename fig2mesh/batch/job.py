@@ -1,4 +1,4 @@
-"""What `fig2mesh batch` does: read the rows, run them, write what stands over them all."""
+"""Implementation of `fig2mesh batch`: read the rows, run them, write the summary of all figures."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from exporters.gis.time_span import time_span
 from exporters.tiles.tileset import short_range_warning
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column
-from fig2mesh.batch.engine import Engine, Stage
+from fig2mesh.batch.engine import Engine, StageNotice
 from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.local_engine import LocalEngine
 from fig2mesh.batch.progress import Tally, watching
 from fig2mesh.batch.request import BatchRequest
 from fig2mesh.batch.row_files import Roots
-from fig2mesh.batch.row_job import LASTING
+from fig2mesh.batch.row_job import FOLDER_KEYS
 from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apart
 from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, check_formats, read_spool, tasks_of, write_spool
@@ -31,13 +31,13 @@ from fig2mesh.errors import InputError, OutputError
 log = logging.getLogger("fig2mesh")
 
 WORKER_BYTES: Final = 2_500_000_000
-"""Memory that a figure of standard quality takes at most, networks included."""
+"""Peak memory of a worker for a figure of standard quality, networks included."""
 
 
 def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
-    """Do what `fig2mesh batch` asks for.
+    """Run a batch.
 
-    Returns the exit code: 0 all rows are done, 2 some are not because of their input, 1 because of us.
+    Returns the exit code: 0 if all rows are done, 2 if some failed because of their input, 1 after internal errors.
     """
     defaults = request.row_defaults
     check_formats(request.formats, "--format")
@@ -52,12 +52,12 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
             count, unknown = write_spool(tasks_of(read_rows(request.collection, request.layer), defaults), partial)
         if count == 0:
             raise InputError(request.collection, "has no rows", "give one row for each figure")
-        _tell_unknown(unknown)
+        _log_unknown(unknown)
         tally = Tally(count)
         engine = _engine(request, batch, count)
         with watching(request.progress, tally, bool(verbose), quiet) as watchers:
             for notice in engine.run(read_spool(spool)):
-                if isinstance(notice, Stage):
+                if isinstance(notice, StageNotice):
                     for watcher in watchers:
                         watcher.stage(notice)
                     continue
@@ -69,14 +69,14 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
                 if notice.lost and not request.dry_run:
                     _keep_failure(folder, notice)
         if request.dry_run:
-            log.info("%d rows: %d are fine, %d are not", count, count - tally.failed, tally.failed)
+            log.info("%d rows: %d valid, %d invalid", count, count - tally.failed, tally.failed)
         else:
             title = request.title or request.collection.stem
             summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
-            _tell(folder, tally, summary)
+            _log_summary(folder, tally, summary)
             if summary.figures and (note := short_range_warning(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)
-        return 0 if not tally.failed else 1 if tally.ours else 2
+        return 0 if not tally.failed else 1 if tally.internal else 2
 
 
 def _engine(request: BatchRequest, batch: Batch, count: int) -> Engine:
@@ -88,7 +88,7 @@ def _engine(request: BatchRequest, batch: Batch, count: int) -> Engine:
 
 
 def usual_jobs() -> int:
-    """As many workers as there are cores, and memory for."""
+    """Default number of workers: as many as there are cores, and memory for."""
     cores = os.cpu_count() or 1
     try:
         memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -99,7 +99,7 @@ def usual_jobs() -> int:
 
 @contextmanager
 def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Path]:
-    """The folder of the outputs, ours alone for now; for a dry run one that goes away again."""
+    """Lock the output folder and yield it; for a dry run, yield a temporary folder."""
     from filelock import FileLock, Timeout
 
     if dry_run or output is None:
@@ -109,18 +109,20 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
         return
     folder = Path(os.path.abspath(output))
     if folder.exists() and not folder.is_dir():
-        raise OutputError(output, "is no folder", "give -o a folder")
+        raise OutputError(output, "not a directory", "give -o a folder")
     if not (folder / WORK).is_dir() and not overwrite:
         for name in TAKEN:
             if (folder / name).exists():
                 raise OutputError(
-                    folder / name, "exists, and is not of an earlier batch", "pass --overwrite or another -o DIR"
+                    folder / name,
+                    "already exists, and is not from an earlier batch",
+                    "use --overwrite or choose another -o DIR",
                 )
     try:
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
         with lock:
-            # The folders of figures are swept by their rows.
+            # Rows sweep the folders of their figures.
             sweep_temporary(folder)
             sweep_temporary(folder / WORK, below=True)
             yield folder
@@ -128,28 +130,28 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
         raise OutputError(output, "another batch is writing there", "wait for it, or choose another -o DIR") from None
 
 
-def _tell_unknown(unknown: dict[str, int]) -> None:
-    """Say which columns are no options; one that is nearly called like an option may be a slip."""
+def _log_unknown(unknown: dict[str, int]) -> None:
+    """Log the columns that are not options, with suggestions for those that may be misspelt."""
     if not unknown:
         return
     known = [*fields_by_column(), *OWN_COLUMNS]
     shown = []
     for column in list(unknown)[:20]:
         near = difflib.get_close_matches(column, known, 1, 0.8)
-        shown.append(f"{column} (not {near[0]}?)" if near else column)
+        shown.append(f"{column} (did you mean {near[0]}?)" if near else column)
     more = f" and {len(unknown) - 20} more" if len(unknown) > 20 else ""
-    log.info("columns that are no options are kept as attributes: %s%s", ", ".join(shown), more)
+    log.info("columns that are not options become attributes: %s%s", ", ".join(shown), more)
 
 
 def _keep_failure(folder: Path, outcome: Outcome) -> None:
-    """Record a row that its worker could not record itself."""
+    """Record the failure of a row whose worker could not record it."""
     ledger = Ledger(folder)
     before = ledger.read(outcome.name) or {}
-    kept: dict[str, Any] = {name: before[name] for name in LASTING if name in before}
+    kept: dict[str, Any] = {name: before[name] for name in FOLDER_KEYS if name in before}
     ledger.write(outcome.name, {**kept, "status": "failed", "error": outcome.error, "ours": True})
 
 
-def _tell(folder: Path, tally: Tally, summary: Summary) -> None:
+def _log_summary(folder: Path, tally: Tally, summary: Summary) -> None:
     log.info(
         "%s: %d figures: %d converted, %d unchanged, %d failed; %d on the globe",
         folder,
@@ -163,6 +165,6 @@ def _tell(folder: Path, tally: Tally, summary: Summary) -> None:
         log.info("%d figures have no place and are not in the tileset", summary.unplaced)
     if summary.left:
         names = ", ".join(summary.left[:5]) + (", …" if len(summary.left) > 5 else "")
-        log.info("%d figures of an earlier collection are left where they are: %s", len(summary.left), names)
+        log.info("%d figures of an earlier collection were left in place: %s", len(summary.left), names)
     if tally.failed:
-        log.error("%d of %d rows failed; %s says why", tally.failed, tally.total, folder / MANIFEST)
+        log.error("%d of %d rows failed; see %s", tally.failed, tally.total, folder / MANIFEST)

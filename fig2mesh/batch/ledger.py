@@ -1,6 +1,6 @@
-"""What is known of each figure of a collection: a small file each, so that no crash can take more than one along.
+"""Records of the figures of a collection: a small file each, so that a crash can damage at most one.
 
-A record appears whole or not at all and carries a digest of itself; one that is damaged counts as a figure that was
+A record is written whole or not at all and contains a digest of itself. A damaged record counts as a figure that was
 begun, whose outputs are made again.
 """
 
@@ -17,26 +17,26 @@ from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 WORK: Final = ".fig2mesh"
-"""Folder, in that of the outputs, of everything that reruns go on from."""
+"""Folder, in the output folder, of everything that reruns resume from."""
 
 BEGUN: Final = "begun"
 
 DAMAGED: Final = {"status": BEGUN, "claimed": True}
-"""What stands for a record that cannot be read: its folder is ours, and nothing is known of it."""
+"""Substitute for a record that cannot be read: its folder belongs to the batch, and nothing else is known."""
 
 
 @dataclass(frozen=True)
 class Ledger:
-    """The records of the collection whose outputs are in `folder`."""
+    """Records of the collection whose outputs are in `folder`."""
 
     folder: Path
 
     def path(self, name: str) -> Path:
-        """Where the record of the figure in `folder/name` is."""
+        """Path of the record of the figure in `folder/name`."""
         return self.folder / WORK / "records" / hashlib.sha256(name.encode()).hexdigest()[:2] / f"{name}.json"
 
     def read(self, name: str) -> dict[str, Any] | None:
-        """The record of a figure; None where there is none, `DAMAGED` where it cannot be read."""
+        """Record of a figure; None where there is none, `DAMAGED` where it cannot be read."""
         try:
             text = self.path(name).read_text(encoding="utf-8")
         except FileNotFoundError:
@@ -53,7 +53,7 @@ class Ledger:
         return record if isinstance(record, dict) and _digest(record) == digest else dict(DAMAGED)
 
     def write(self, name: str, record: dict[str, Any]) -> None:
-        """Keep a record. Raises OSError where the disk refuses."""
+        """Write a record. Raises OSError if that fails."""
         path = self.path(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         write_text(path, json.dumps([record, _digest(record)], ensure_ascii=False))

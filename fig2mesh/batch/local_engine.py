@@ -1,4 +1,4 @@
-"""Worker processes of this machine, one row at a time each; networks stay loaded from row to row."""
+"""Local worker processes, which handle one row at a time each and keep the networks loaded."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Final
 
-from fig2mesh.batch.engine import Stage, lost
+from fig2mesh.batch.engine import StageNotice, lost
 from fig2mesh.batch.row_job import check_row, convert_row
-from fig2mesh.batch.task import Batch, Outcome, Task
+from fig2mesh.batch.task import Batch, Outcome, RowTask
 
 # fmt: off
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
@@ -23,22 +23,22 @@ THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", 
 # fmt: on
 
 TRIES: Final = 2
-"""A row whose worker died is tried again; if that one dies too, the row is at fault, or the machine too small."""
+"""Attempts per row whose workers die; after that the row is at fault, or the machine has too little memory."""
 
 PARENT_S: Final = 1.0
-"""How often a worker looks whether its parent is still there."""
+"""Interval at which a worker checks that its parent is alive, seconds."""
 
 
 @dataclass
 class _Worker:
     process: Any
     pipe: Connection
-    task: Task | None = None
+    task: RowTask | None = None
     since: float = 0.0
 
 
 class LocalEngine:
-    """`jobs` processes; timeout_s : longest that a row may take; dry : rows are only checked."""
+    """Engine of `jobs` processes; timeout_s : for each row; dry : rows are only checked."""
 
     def __init__(self, batch: Batch, jobs: int, timeout_s: float, dry: bool = False) -> None:
         self._batch, self._jobs, self._timeout_s, self._dry = batch, jobs, timeout_s, dry
@@ -48,10 +48,10 @@ class LocalEngine:
         """Number of processes."""
         return self._jobs
 
-    def run(self, tasks: Iterable[Task]) -> Iterator[Outcome | Stage]:
+    def run(self, tasks: Iterable[RowTask]) -> Iterator[Outcome | StageNotice]:
         """See `Engine.run`."""
         queue = iter(tasks)
-        again: list[Task] = []
+        again: list[RowTask] = []
         deaths: dict[int, int] = {}
         workers: list[_Worker] = []
 
@@ -61,7 +61,7 @@ class LocalEngine:
             if task is None:
                 return False
             worker.since = time.monotonic()
-            with suppress(OSError):  # one that died meanwhile is found by its pipe
+            with suppress(OSError):  # a worker that has died is detected by its pipe
                 worker.pipe.send(task)
             return True
 
@@ -96,8 +96,8 @@ class LocalEngine:
                         give(worker)
                         yield message
                     else:
-                        yield Stage(str(worker.process.pid), task.number, task.name, message)
-                for worker in busy.values():  # those that have said nothing
+                        yield StageNotice(str(worker.process.pid), task.number, task.name, message)
+                for worker in busy.values():  # those without a message
                     if worker.task is not None and time.monotonic() - worker.since > self._timeout_s:
                         task = worker.task
                         worker.process.kill()
@@ -117,7 +117,7 @@ class LocalEngine:
         ours, theirs = multiprocessing.Pipe()
         context = multiprocessing.get_context("spawn")
         threads = max(1, (os.cpu_count() or 1) // self._jobs)
-        # Libraries read these when they are loaded, so they are set before a process begins.
+        # Libraries read these when they are loaded, so they are set before a process starts.
         with _environment({name: os.environ.get(name, str(threads)) for name in THREADS}):
             process = context.Process(
                 target=_work, args=(theirs, self._batch, self._dry, os.getpid()), daemon=True, name="fig2mesh-worker"
@@ -133,7 +133,7 @@ class LocalEngine:
         return int(worker.process.exitcode or 0)
 
 
-def _died(task: Task, code: int) -> Outcome:
+def _died(task: RowTask, code: int) -> Outcome:
     how = f"signal {-code}" if code < 0 else f"exit code {code}"
     hint = "; it may have run out of memory: try fewer --jobs" if code == -signal.SIGKILL else ""
     return lost(task, f"its worker ended with {how}, {TRIES} times{hint}")
@@ -154,8 +154,8 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
 
 
 def _work(pipe: Connection, batch: Batch, dry: bool, parent: int) -> None:
-    """The life of a worker: tasks in, stages and outcomes out, until the pipe is closed."""
-    # Ctrl-C reaches the whole group; the parent decides what becomes of it.
+    """Main loop of a worker: receive tasks, send stages and outcomes, until the pipe is closed."""
+    # Ctrl-C reaches the whole process group; the parent handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
     with suppress(EOFError, OSError):
@@ -165,7 +165,7 @@ def _work(pipe: Connection, batch: Batch, dry: bool, parent: int) -> None:
 
 
 def _watch(parent: int) -> None:
-    """End with the parent, however it ended: a row nobody waits for must not be in the way of the next run."""
+    """Exit when the parent has ended, however it ended, so that orphaned rows do not disturb the next run."""
     while os.getppid() == parent:
         time.sleep(PARENT_S)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""How far a batch is: a bar on a terminal, the state of each worker on demand, or a stream of events for programs."""
+"""Progress of a batch: a bar on a terminal, the state of each worker on demand, or a stream of events for programs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, Protocol, TextIO
 
-from fig2mesh.batch.engine import Stage
+from fig2mesh.batch.engine import StageNotice
 from fig2mesh.batch.task import Outcome
 
 log = logging.getLogger("fig2mesh")
@@ -22,16 +22,16 @@ log = logging.getLogger("fig2mesh")
 Kind = Literal["auto", "bar", "json", "none"]
 
 SHOWN: Final = 20
-"""Failed rows that are named as they fail; the manifest has them all."""
+"""Number of failed rows that are logged; the manifest lists them all."""
 
 RECENT: Final = 200
-"""Rows that the rate is taken over."""
+"""Number of rows over which the rate is averaged."""
 
 
 class Watcher(Protocol):
-    """Is told of everything."""
+    """Observer of the stages and outcomes of a run."""
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """A worker begins a stage."""
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
@@ -40,14 +40,17 @@ class Watcher(Protocol):
 
 @dataclass
 class Tally:
-    """Counts of a run. total : rows; converted, unchanged, failed, ours : rows of each kind, `ours` among the failed;
-    stages : how often each stage ran; counts : work done, by kind."""
+    """Counts of a run.
+
+    total : rows; converted, unchanged, failed, internal : rows of each kind, internal errors among the failed
+    stages : number of runs of each stage; counts : work done, by kind
+    """
 
     total: int
     converted: int = 0
     unchanged: int = 0
     failed: int = 0
-    ours: int = 0
+    internal: int = 0
     stages: dict[str, int] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     start: float = field(default_factory=time.monotonic)
@@ -59,10 +62,10 @@ class Tally:
         return self.converted + self.failed + self.unchanged
 
     def add(self, outcome: Outcome) -> None:
-        """Count a row. What was unchanged counts so, failed or not."""
+        """Count a row; an unchanged failure counts as failed."""
         if outcome.status == "failed":
             self.failed += 1
-            self.ours += outcome.ours
+            self.internal += outcome.internal
         elif outcome.unchanged:
             self.unchanged += 1
         else:
@@ -75,7 +78,7 @@ class Tally:
 
     @property
     def per_minute(self) -> float:
-        """Rows a minute, of late."""
+        """Recent rate, rows per minute."""
         if not self.ends:
             return 0.0
         first = self.start if len(self.ends) < RECENT else self.ends[0]
@@ -83,12 +86,12 @@ class Tally:
 
     @property
     def left_s(self) -> float | None:
-        """Seconds until the end at this rate; None before the first row has ended."""
+        """Estimated seconds until the end; None before the first row has ended."""
         rate = self.per_minute
         return 60 * (self.total - self.ended) / rate if rate else None
 
     def as_dict(self) -> dict[str, Any]:
-        """For events."""
+        """Fields for events."""
         left = self.left_s
         return {
             "total": self.total,
@@ -102,24 +105,24 @@ class Tally:
 
 
 class Events:
-    """One JSON object a line: start, stage, row, end; `t` is seconds since the start."""
+    """Events start, stage, row and end, one JSON object per line; `t` is seconds since the start."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream, self._start = stream, time.monotonic()
 
-    def say(self, event: str, **facts: Any) -> None:
-        """Write an event at once."""
+    def emit(self, event: str, **facts: Any) -> None:
+        """Write an event and flush."""
         line = {"event": event, "t": round(time.monotonic() - self._start, 3), **facts}
         self._stream.write(json.dumps(line, ensure_ascii=False) + "\n")
         self._stream.flush()
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """A worker begins a stage."""
-        self.say("stage", worker=notice.worker, row=notice.number, name=notice.name, stage=notice.stage)
+        self.emit("stage", worker=notice.worker, row=notice.number, name=notice.name, stage=notice.stage)
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
         """A row has ended."""
-        self.say(
+        self.emit(
             "row",
             row=outcome.number,
             name=outcome.name,
@@ -134,10 +137,10 @@ class Events:
 
 
 class Lines:
-    """Failed rows as they fail, on stderr."""
+    """Log of failed rows, on stderr."""
 
-    def stage(self, notice: Stage) -> None:
-        """Nothing is said."""
+    def stage(self, notice: StageNotice) -> None:
+        """Stages are not logged."""
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
         """A row has ended."""
@@ -148,28 +151,28 @@ class Lines:
 
 
 def failed_line(outcome: Outcome) -> str:
-    """A failed row in one line."""
+    """Description of a failed row in one line."""
     return f"row {outcome.number}, {outcome.name}: {outcome.error}"
 
 
 class Workers:
-    """What each worker does, for who asks: with -v below the bar, and on the signal USR1."""
+    """Current stage of each worker: shown below the bar with -v, and on the signal USR1."""
 
     def __init__(self) -> None:
-        self.now: dict[str, tuple[Stage, float]] = {}
+        self.now: dict[str, tuple[StageNotice, float]] = {}
 
-    def stage(self, notice: Stage) -> None:
+    def stage(self, notice: StageNotice) -> None:
         """A worker begins a stage."""
         self.now[notice.worker] = (notice, time.monotonic())
 
     def row(self, outcome: Outcome, tally: Tally) -> None:
-        """A row has ended: its worker has nothing for now."""
+        """A row has ended, so its worker is idle."""
         for worker, (notice, _) in list(self.now.items()):
             if notice.number == outcome.number:
                 del self.now[worker]
 
     def lines(self) -> list[str]:
-        """One line a worker."""
+        """One line per worker."""
         return [
             f"worker {worker}: row {notice.number}, {notice.name}: {notice.stage}, {time.monotonic() - since:.0f} s"
             for worker, (notice, since) in sorted(self.now.items())
@@ -178,15 +181,15 @@ class Workers:
 
 @contextmanager
 def watching(kind: Kind, tally: Tally, verbose: bool, quiet: bool) -> Iterator[list[Watcher]]:
-    """The watchers of a run: bar or events, and what is asked of the workers."""
+    """Watchers of a run: bar or events, log of failures, and state of the workers."""
     workers = Workers()
     watchers: list[Watcher] = [workers, Lines()]
     with _on_signal(tally, workers):
         if kind == "json":
             events = Events(sys.stdout)
-            events.say("start", progress=tally.as_dict())
+            events.emit("start", progress=tally.as_dict())
             yield [*watchers, events]
-            events.say("end", progress=tally.as_dict(), stages=tally.stages, counts=tally.counts)
+            events.emit("end", progress=tally.as_dict(), stages=tally.stages, counts=tally.counts)
             return
         if kind == "none" or (kind == "auto" and (quiet or not sys.stderr.isatty())):
             yield watchers
@@ -197,7 +200,7 @@ def watching(kind: Kind, tally: Tally, verbose: bool, quiet: bool) -> Iterator[l
 
 @contextmanager
 def _on_signal(tally: Tally, workers: Workers) -> Iterator[None]:
-    """Let USR1 print how far each worker is, where the system has such a signal."""
+    """Print the state of each worker on the signal USR1, on systems that have it."""
     if not hasattr(signal, "SIGUSR1") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -235,8 +238,8 @@ def _bar(tally: Tally, workers: Workers | None) -> Iterator[Watcher]:
     live = Live(console=Console(stderr=True), transient=True, refresh_per_second=4, get_renderable=shown)
 
     class Bar:
-        def stage(self, notice: Stage) -> None:
-            """The lines of the workers are made when they are shown."""
+        def stage(self, notice: StageNotice) -> None:
+            """The lines of the workers are formatted when they are shown."""
 
         def row(self, outcome: Outcome, tally: Tally) -> None:
             """A row has ended."""

@@ -14,71 +14,84 @@ from fig2mesh.errors import InputError
 
 @request_class
 class BatchRequest:
-    """A collection, and how it is converted.
+    """A collection, and options for converting it.
 
-    defaults : options of the main job for rows that have none, by column
+    defaults : options of the main command for rows without them, by column
     """
 
     collection: Path = option(
         kw_only=False, argument=True, help="CSV, GeoJSON or GeoPackage with a row for each figure."
     )
-    output: Path | None = option(default=None, short="o", metavar="DIR", help="Folder of the outputs.")
+    output: Path | None = option(default=None, short="o", metavar="DIR", help="Output folder.")
     jobs: int | None = option(
-        default=None, low=1, high=1024, metavar="N", help="Rows at a time; default: one for each core."
+        default=None,
+        low=1,
+        high=1024,
+        metavar="N",
+        help="Number of rows to convert at a time. Default: one per core, as far as memory allows.",
     )
     engine: Literal["local", "dask"] = option(
-        default="local", help="Worker processes of this machine, or a Dask cluster."
+        default="local", help="Run worker processes on this machine, or use a Dask cluster."
     )
-    address: str | None = option(default=None, metavar="tcp://…", help="Of the Dask scheduler.")
+    address: str | None = option(default=None, metavar="tcp://…", help="Address of the Dask scheduler.")
     resume: bool = option(
-        default=True, negative="fresh", help="Keep what an earlier run has finished, or make everything anew."
+        default=True, negative="fresh", help="Keep the finished figures of an earlier run, or convert everything again."
     )
     formats: tuple[str, ...] = option(
-        default=(), name="format", metavar="SUFFIX", help="Made besides .glb, such as usdz; repeatable."
+        default=(),
+        name="format",
+        metavar="SUFFIX",
+        help="Additional output format besides .glb, such as usdz. Repeatable.",
     )
-    dry_run: bool = option(default=False, help="Check every row, report all problems, write nothing.")
+    dry_run: bool = option(default=False, help="Check all rows and report problems, without writing anything.")
     progress: Literal["auto", "bar", "json", "none"] = option(
-        default="auto", help="json: events on stdout, one a line. With -v the bar shows what each worker does."
+        default="auto",
+        help="Progress display. json: one event per line on stdout. With -v the bar shows the stage of each worker.",
     )
-    timeout: float = option(
-        default=1800.0, low=1, metavar="S", help="Longest that a row may take (local engine), seconds."
-    )
+    timeout: float = option(default=1800.0, low=1, metavar="S", help="Time limit per row, seconds (local engine only).")
     root: Path | None = option(
-        default=None, metavar="DIR", help="Folder that rows' files may not leave; default: COLLECTION's."
+        default=None,
+        metavar="DIR",
+        help="Folder outside of which rows may not name files. Default: COLLECTION's folder.",
     )
     layer: str | None = option(
-        default=None, metavar="NAME", help="Of a GeoPackage; default: the one with a column figure."
+        default=None, metavar="NAME", help="Layer of a GeoPackage. Default: the only one with a column figure."
     )
-    unplaced: bool = option(default=False, help="Rows need no place on the earth.")
+    unplaced: bool = option(default=False, help="Accept rows without a place on the earth.")
     date: str | None = option(
         default=None,
         metavar="DATE",
-        help="Of rows that have none: 1893, 1893-05-17, 1893/1895; for the catalogue.",
+        help="Date in the STAC catalogue of rows without one: 1893, 1893-05-17 or 1893/1895.",
     )
-    title: str | None = option(default=None, metavar="TEXT", help="Of the catalogue; default: COLLECTION's stem.")
+    title: str | None = option(
+        default=None, metavar="TEXT", help="Title of the STAC catalogue. Default: COLLECTION without its suffix."
+    )
     visible_from: float | None = option(
         default=None,
         metavar="M",
-        help="Distance from which a figure is drawn, on a screen of 1080 rows; default: about 1,100 times its height.",
+        help="Distance at which clients begin to draw a figure, metres, on a screen 1080 pixels high. Default: about "
+        "1,100 times its height.",
     )
-    overwrite: bool = option(default=False, help="Replace files in DIR that are not of an earlier batch.")
+    overwrite: bool = option(default=False, help="Replace existing files in DIR that are not from an earlier batch.")
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_fields(self)
         check_visible_from(self.visible_from)
         if self.engine == "dask" and self.address is None:
-            raise InputError("--engine dask", "no scheduler is named", "pass --address tcp://HOST:8786")
+            raise InputError("--engine dask", "requires --address", "add --address tcp://HOST:8786")
         if self.engine == "local" and self.address is not None:
-            raise InputError("--address", "given without --engine dask", "pass --engine dask as well")
+            raise InputError("--address", "requires --engine dask", "add --engine dask")
         if self.output is None and not self.dry_run:
-            raise InputError("-o", "no folder for the outputs", "pass -o DIR")
+            raise InputError("-o", "no output folder", "give -o DIR")
         if self.root is not None and not self.root.is_dir():
-            raise InputError("--root", f"no folder {self.root}", "name a folder that holds the collection's files")
+            raise InputError(
+                "--root", f"no such directory {self.root}", "name a folder that contains the collection's files"
+            )
 
     @property
     def row_defaults(self) -> dict[str, Any]:
-        """What holds for rows that do not say it, by column."""
+        """Values for rows that do not have them, by column."""
         found = dict(self.defaults)
         if self.formats:
             found["format"] = self.formats

@@ -1,4 +1,4 @@
-"""A row whose files have been found: its request, and digests of all that its outputs depend on."""
+"""A row whose files have been resolved: its request, and digests of everything that its outputs depend on."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fig2mesh.batch.row_files import digest_of, input_files, resolve, sheet_files, stand
-from fig2mesh.batch.task import Batch, Task
+from fig2mesh.batch.row_files import digest_of, files_unchanged, input_files, resolve, sheet_files
+from fig2mesh.batch.task import Batch, RowTask
 from fig2mesh.conversion.request import PlaceRequest, Request
 from fig2mesh.errors import InputError
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 class ResolvedRow:
-    """A row's request with the files that it names.
+    """A row's request with resolved paths.
 
-    request : with paths that can be opened from anywhere
+    request : with paths that can be opened from any folder
     inputs : digest of every file that it depends on, by path
-    key : digest of all that its outputs depend on
+    key : digest of everything that its outputs depend on
 
     Raises InputError naming the column.
     """
 
-    def __init__(self, batch: Batch, task: Task) -> None:
+    def __init__(self, batch: Batch, task: RowTask) -> None:
         from exporters.gis.time_span import time_span
         from fig2mesh.conversion.keys import key_of
 
@@ -40,15 +40,15 @@ class ResolvedRow:
             time_span(task.date, "column date")
         resolved = resolve(task.request, batch.roots, task.own_files)
         self.request: Request = replace(resolved, outputs=self.targets)
-        if not (resolved.somewhere or batch.unplaced):
-            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or pass --unplaced")
+        if not (resolved.has_place or batch.unplaced):
+            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or use --unplaced")
         files = input_files(resolved)
         self.inputs: dict[str, str] = {
-            self._seen(file): digest_of(file) for name in sorted(files) for file in files[name]
+            self._relative(file): digest_of(file) for name in sorted(files) for file in files[name]
         }
         values = {each.name: getattr(resolved, each.name) for each in fields(resolved)}
         self.key = key_of(
-            options={name: self._seen(v) if isinstance(v, Path) else str(v) for name, v in values.items()},
+            options={name: self._relative(v) if isinstance(v, Path) else str(v) for name, v in values.items()},
             formats=task.formats,
             date=task.date,
             inputs=self.inputs,
@@ -56,12 +56,12 @@ class ResolvedRow:
             title=task.title,
         )
 
-    def _seen(self, file: Path) -> str:
+    def _relative(self, file: Path) -> str:
         real, root = Path(os.path.realpath(file)), self.batch.roots.root
         return (real.relative_to(root) if real.is_relative_to(root) else real).as_posix()
 
     def sheet(self) -> MapSheet | None:
-        """The map that the place is from, if any. Raises InputError."""
+        """Map sheet of the place, if any. Raises InputError."""
         from fig2mesh.conversion.place import open_map
 
         if self.request.map is None:
@@ -71,18 +71,18 @@ class ResolvedRow:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Outputs as seen from the folder of the figure."""
+        """Outputs, relative to the folder of the figure."""
         suffixes = dict.fromkeys(("glb", *(each.lower().lstrip(".") for each in self.task.formats)))
         return tuple(f"{self.task.name}.{suffix}" for suffix in suffixes)
 
-    def stands(self, record: dict[str, Any]) -> bool:
-        """Whether a record of the same key says how this ends: its outputs are there, or its failure is lasting."""
+    def is_current(self, record: dict[str, Any]) -> bool:
+        """Whether a record of the same key is up to date: its outputs are unchanged, or its failure is permanent."""
         if record["status"] == "failed":
             return bool(record.get("lasting"))
-        return record["status"] == "done" and stand(self.batch.folder, record["outputs"])
+        return record["status"] == "done" and files_unchanged(self.batch.folder, record["outputs"])
 
     def profile(self) -> Profile:
-        """What the client of the outputs takes. Raises InputError where it does not read them."""
+        """Profile of the outputs' client. Raises InputError if the client does not read them."""
         from exporters.profiles import profile_named
         from exporters.write import needs_place
 
@@ -90,17 +90,17 @@ class ResolvedRow:
         profile.check_tools()
         for target in self.targets:
             profile.check(target, Path(target).suffix.lower())
-            if needs_place(target) and not self.request.somewhere:
-                raise InputError("column format", f"{target} needs a place on earth", "give lon and lat")
+            if needs_place(target) and not self.request.has_place:
+                raise InputError("column format", f"{target} needs a place on the earth", "give lon and lat")
         return profile
 
     def check_values(self) -> None:
-        """Check all that can be without reading the figure. Raises InputError."""
+        """Check everything that needs no reading of the figure. Raises InputError."""
         self.profile()
         self.sheet()
 
     def check(self) -> None:
-        """Check the values, and read the figure's files as far as they are given. Raises InputError."""
+        """Check the values, and read the given files of the figure. Raises InputError."""
         from fig2mesh.parse.read import read_given
 
         self.check_values()
@@ -109,7 +109,7 @@ class ResolvedRow:
 
 @lru_cache(maxsize=8)
 def _open_map(request: PlaceRequest, digests: tuple[str, ...]) -> MapSheet | None:
-    """The sheet of a request; the same one is read once."""
+    """Map sheet of a request, cached by the digests of its files."""
     from fig2mesh.conversion.place import open_map
 
     return open_map(request)

@@ -1,4 +1,4 @@
-"""The files that a row names: inside the collection's folder, and their digests."""
+"""Files named by a row, which must lie inside the collection's folder, and their digests."""
 
 from __future__ import annotations
 
@@ -23,39 +23,39 @@ FILE_FIELDS = ("mask", "keypoints", "part_labels", "map", "altitude_datum")
 
 @dataclass(frozen=True)
 class Roots:
-    """base : folder from which the rows' paths are seen, the collection's; root : folder that they may not leave."""
+    """base : folder of the collection, to which paths are relative; root : folder that paths may not leave."""
 
     base: Path
     root: Path
 
     def resolve(self, column: str, path: Path) -> Path:
-        """The file a row means. Raises InputError where it is outside of `root`, through links too."""
+        """Path of a file named in a row. Raises InputError if it is outside of `root`, also through links."""
         whole, shown = self.base / path, str(path)[:120]
         try:
             real = Path(os.path.realpath(whole, strict=False))
             if not real.is_relative_to(self.root):
                 straight = Path(os.path.normpath(whole)).is_relative_to(self.base)
                 found = f"{shown} is a link out of {self.root}" if straight else f"{shown} leads out of {self.root}"
-                raise InputError(f"column {column}", found, "put the file there, or pass --root DIR")
+                raise InputError(f"column {column}", found, "move the file there, or use --root DIR")
             if not stat.S_ISREG(os.stat(real).st_mode):
-                raise InputError(f"column {column}", f"{shown} is no file", "check the path")
+                raise InputError(f"column {column}", f"{shown} is not a file", "check the path")
         except OSError as error:  # also loops of links, and names that are too long
             raise InputError(f"column {column}", f"{shown}: {error.strerror}", "check the path") from None
         except ValueError as error:
-            raise InputError(f"column {column}", f"{shown!r} is no path ({error})", "check the path") from None
+            raise InputError(f"column {column}", f"{shown!r} is not a path ({error})", "check the path") from None
         return whole
 
     def shorten(self, text: str) -> str:
-        """A message without the folder that all its paths have in common."""
+        """A message without the common folder of its paths."""
         for folder in (self.base, Path(os.path.realpath(self.base)), self.root):
             text = text.replace(f"{folder}{os.sep}", "")
         return text
 
 
 def resolve(request: Request, roots: Roots, own: Collection[str]) -> Request:
-    """The request of a row with the paths that the row names resolved.
+    """Request of a row, with the paths that the row names resolved.
 
-    own : names of the fields whose files the row names; others are from the command line, which may name any
+    own : names of the fields whose files the row names; those from the command line may be anywhere
 
     Raises InputError naming the column.
     """
@@ -73,14 +73,14 @@ def resolve(request: Request, roots: Roots, own: Collection[str]) -> Request:
 
 
 def sheet_files(sheet: Path) -> list[Path]:
-    """A sheet and what may belong to it: files beside it that begin with its stem and a dot."""
+    """A map sheet and its possible sidecar files, whose names begin with its stem and a dot."""
     start = sheet.stem.casefold() + "."
     beside = [file for file in sheet.parent.iterdir() if file.name.casefold().startswith(start) and file.is_file()]
     return sorted({sheet, *beside})
 
 
 def input_files(request: Request) -> dict[str, list[Path]]:
-    """Files that decide what becomes of a resolved request, by the field that names them."""
+    """Input files of a resolved request, by the field that names them."""
     files = {"figure": [request.figure]}
     for name in ("mask", "keypoints", "part_labels"):
         if (path := getattr(request, name)) is not None:
@@ -93,7 +93,7 @@ def input_files(request: Request) -> dict[str, list[Path]]:
 
 
 def digest_of(path: Path) -> str:
-    """SHA-256 of a file; read once, as long as size and time of change stay the same."""
+    """SHA-256 of a file, cached until its size or modification time changes."""
     facts = path.stat()
     return _digest(path, facts.st_size, facts.st_mtime_ns, facts.st_ino)
 
@@ -103,8 +103,8 @@ def _digest(path: Path, size: int, changed_ns: int, inode: int) -> str:
     return sha256_of(path)
 
 
-def stand(folder: Path, files: dict[str, str]) -> bool:
-    """Whether files are there as they were left. files : path seen from the folder → digest"""
+def files_unchanged(folder: Path, files: dict[str, str]) -> bool:
+    """Whether files are unchanged; files : path relative to the folder → digest."""
     try:
         return all(digest_of(folder / name) == digest for name, digest in files.items())
     except OSError:

@@ -1,4 +1,4 @@
-"""One figure of a collection, from its row to its files and its record; runs in workers, on this machine or others."""
+"""Conversion of one row of a collection to its files and its record; runs in workers, local or remote."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fig2mesh.batch.collections.rows import Value
 from fig2mesh.batch.ledger import BEGUN, WORK, Ledger
 from fig2mesh.batch.resolved_row import ResolvedRow
 from fig2mesh.batch.row_files import digest_of
-from fig2mesh.batch.task import Batch, Outcome, Task
+from fig2mesh.batch.task import Batch, Outcome, RowTask
 from fig2mesh.errors import InputError, OutputError
 
 if TYPE_CHECKING:
@@ -25,48 +25,53 @@ if TYPE_CHECKING:
     from fig2mesh.conversion.stores import KeyedStore
 
 READ = "figure"
-"""Name of the result of reading and parsing, which comes before the stages."""
+"""Name of the result of reading and parsing, which precede the stages."""
 
 MEASURES = "measures"
-"""Name of what is measured on the model, which takes longer than writing it."""
+"""Name of the result of measuring the model, which takes longer than writing it."""
 
 UNKNOWN_DATE = "0001/9999"
-"""A catalogue must have a date; when a file was changed says nothing of the drawing, and is lost by copying."""
+"""Date in the catalogue, which requires one. The modification time of a file is not that of the drawing, and copying
+changes it."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
-LASTING = ("claimed", "files")
-"""What a record says of the folder, whatever becomes of the row: whether a batch has begun it, files that are ours."""
+FOLDER_KEYS = ("claimed", "files")
+"""Entries of a record about the folder, kept whatever the outcome of the row: whether it belongs to the batch, and the
+files that the batch has written there."""
 
 Advance = Callable[[str], object]
 
 
-def check_row(batch: Batch, task: Task) -> Outcome:
-    """Read everything that a row names, and say what is wrong; nothing is written, no network runs."""
+def check_row(batch: Batch, task: RowTask) -> Outcome:
+    """Read all files of a row and report problems, without writing anything or running a network."""
     try:
         ResolvedRow(batch, task).check()
     except InputError as error:
         return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
     except Exception as error:
-        return Outcome(task.number, task.name, "failed", _line(error), ours=True)
+        return Outcome(task.number, task.name, "failed", _line(error), internal=True)
     return Outcome(task.number, task.name, "done")
 
 
-def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None) -> Outcome:
-    """Convert a row, unless its outputs are there and of the same input; nothing that goes wrong is raised.
+def convert_row(batch: Batch, task: RowTask, advance: Advance = lambda stage: None) -> Outcome:
+    """Convert a row, unless its outputs are up to date; errors become part of the outcome.
 
-    advance : told the name of each stage before it runs
+    advance : called with the name of each stage before it runs
     """
     ledger = Ledger(batch.folder)
     start = time.perf_counter()
     before = ledger.read(task.name)
-    record: dict[str, Any] = {"status": BEGUN, **{name: before[name] for name in LASTING if before and name in before}}
+    record: dict[str, Any] = {
+        "status": BEGUN,
+        **{name: before[name] for name in FOLDER_KEYS if before and name in before},
+    }
     fault: BaseException | None = None
     try:
         try:
             row = ResolvedRow(batch, task)
             record["key"] = row.key
-            if not batch.fresh and before is not None and before.get("key") == row.key and row.stands(before):
+            if not batch.fresh and before is not None and before.get("key") == row.key and row.is_current(before):
                 return _outcome(task, before, unchanged=True)
             row.check_values()
             _claim(batch, task, ledger, record)
@@ -76,7 +81,7 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
             record |= _convert(row, store, record.get("files", ()), advance) | {"status": "done"}
         except InputError as error:
             fault = error
-            # What the disk refuses may go well next time; what is wrong with the input will not.
+            # Errors of the disk may not recur; errors of the input will.
             record |= {"status": "failed", "error": batch.roots.shorten(_line(error))}
             record["lasting"] = "key" in record and error.permanent
         except Exception as error:
@@ -86,22 +91,22 @@ def convert_row(batch: Batch, task: Task, advance: Advance = lambda stage: None)
         record["full"] = fault is not None and _full(fault)
         record["seconds"] = round(time.perf_counter() - start, 3)
         if before is not None and record | {"seconds": before.get("seconds")} == before:
-            record = before  # it failed as it did before
+            record = before  # the same failure as before
         ledger.write(task.name, record)
     except OSError as error:
-        record |= {"status": "failed", "error": f"its record cannot be kept ({error.strerror})"}
+        record |= {"status": "failed", "error": f"its record cannot be written ({error.strerror})"}
         record["full"] = error.errno in FULL
     return _outcome(task, record)
 
 
-def _outcome(task: Task, record: dict[str, Any], unchanged: bool = False) -> Outcome:
+def _outcome(task: RowTask, record: dict[str, Any], unchanged: bool = False) -> Outcome:
     work = record.get("work", {}) if not unchanged else {}
     return Outcome(
         number=task.number,
         name=task.name,
         status=record["status"],
         error=record.get("error"),
-        ours=record.get("ours", False),
+        internal=record.get("ours", False),
         full=record.get("full", False),
         unchanged=unchanged,
         seconds=record.get("seconds", 0.0),
@@ -112,7 +117,7 @@ def _outcome(task: Task, record: dict[str, Any], unchanged: bool = False) -> Out
 
 
 def _full(error: BaseException | None) -> bool:
-    """Whether an error comes from a disk without space."""
+    """Whether an error was caused by a full disk."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in FULL:
             return True
@@ -121,17 +126,19 @@ def _full(error: BaseException | None) -> bool:
 
 
 def _line(error: Exception) -> str:
-    # Nobody has to know where files are before they are in place.
+    # Temporary paths are of no use to the user.
     return " ".join(without_temporary(str(error)).split())[:500] or type(error).__name__
 
 
-def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> None:
-    """Note that the folder of a figure is ours from now on, and clear away what a worker that died has left there."""
+def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) -> None:
+    """Record that the folder of a figure belongs to the batch, and remove temporary files of workers that died."""
     target = batch.folder / task.name
     if target.is_symlink():
-        raise OutputError(target, "is a link", "remove it, or name the figure otherwise")
+        raise OutputError(target, "is a link", "remove it, or rename the figure")
     if not record.get("claimed") and os.path.lexists(target) and not batch.overwrite:
-        raise OutputError(target, "exists, and is not of an earlier batch", "pass --overwrite or another -o DIR")
+        raise OutputError(
+            target, "already exists, and is not from an earlier batch", "use --overwrite or choose another -o DIR"
+        )
     record["claimed"] = True
     ledger.write(task.name, record)
     if target.is_dir():
@@ -139,7 +146,7 @@ def _claim(batch: Batch, task: Task, ledger: Ledger, record: dict[str, Any]) -> 
 
 
 def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance: Advance) -> dict[str, Any]:
-    """Make the outputs in place of the files `before`; returns what the record says of them."""
+    """Make the outputs, replacing the files `before`; return the entries of the record."""
     from exporters.placed_figure import figure_of
     from fig2mesh.conversion.convert import convert
     from fig2mesh.conversion.keys import key_of
@@ -188,16 +195,16 @@ def _figure_files(request: Request) -> dict[str, Path]:
 
 
 def _levels(row: ResolvedRow, asset: Asset) -> list[str]:
-    """Files of the levels of detail, finest first."""
+    """File names of the levels of detail, finest first."""
     from exporters.tiles.tileset import content_name
 
     return [content_name(row.task.name, level) for level in range(len(asset.lods))]
 
 
 def _write(row: ResolvedRow, asset: Asset, before: Sequence[str]) -> dict[str, tuple[int, str]]:
-    """Write all outputs, or none; returns size and digest of each, by its path below the batch's folder.
+    """Write all outputs or none; return size and digest of each, by its path relative to the batch's folder.
 
-    before : files that an earlier run has left in the folder of the figure
+    before : files of an earlier run in the folder of the figure
     """
     from exporters.atomic_file import write_whole
     from exporters.write import in_order, write
@@ -219,7 +226,7 @@ def _write(row: ResolvedRow, asset: Asset, before: Sequence[str]) -> dict[str, t
 
 
 def _plain(attributes: Mapping[str, Value]) -> Attributes:
-    """Attributes as indexes hold them: lists as text."""
+    """Attributes for indexes, with lists as text."""
     from exporters.placed_figure import plain_attributes
 
     return plain_attributes(

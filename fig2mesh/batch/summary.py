@@ -1,4 +1,4 @@
-"""What stands over all figures of a collection: manifest, tileset, indexes, catalogue; from the records alone."""
+"""Files for a whole collection: manifest, tileset, indexes and catalogue, made from the records alone."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from fig2mesh.batch.ledger import WORK, Ledger
-from fig2mesh.batch.row_files import digest_of, stand
-from fig2mesh.batch.task import Task
+from fig2mesh.batch.row_files import digest_of, files_unchanged
+from fig2mesh.batch.task import RowTask
 from fig2mesh.batch.tasks import read_spool
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
@@ -23,13 +23,16 @@ from georef.untrusted.json_file import parse_json
 MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
 
 REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "notes")
-"""What the manifest takes from the record of a row that is done."""
+"""Entries that the manifest copies from the record of a finished row."""
 
 
 @dataclass(frozen=True)
 class Collection:
-    """folder : of the outputs; spool : of the tasks; columns : of the user that the indexes carry, in order;
-    title : of the collection; visible_from_m : of the tileset, None: by the height of each figure."""
+    """A collection to be summarised.
+
+    folder : of the outputs; spool : of the tasks; columns : attributes of the user for the indexes, in order
+    title : of the collection; visible_from_m : of the tileset, None to derive it from the height of each figure
+    """
 
     folder: Path
     spool: Path
@@ -40,9 +43,12 @@ class Collection:
 
 @dataclass(frozen=True)
 class Summary:
-    """figures : on the globe; tallest_m : height of the tallest of them, 0 without; unplaced : converted without a
-    place; failed : rows; written : files, none if all were there; left : names of figures that an earlier collection
-    had."""
+    """Result of `summarise`.
+
+    figures : number of figures with a place; tallest_m : height of the tallest of them, 0 without any
+    unplaced : number of figures without a place; failed : number of rows
+    written : files, empty if all were up to date; left : names of figures of an earlier collection
+    """
 
     figures: int
     tallest_m: float
@@ -53,15 +59,15 @@ class Summary:
 
 
 def summarise_apart(collection: Collection) -> Summary:
-    """`summarise` in a process of its own, whose memory (about 5 kB a figure) goes back when it ends."""
+    """Run `summarise` in a separate process, so that its memory (about 5 kB per figure) is freed afterwards."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         return pool.submit(summarise, collection).result()
 
 
 def summarise(collection: Collection) -> Summary:
-    """Write what stands over all figures, whole or not at all; nothing where all of it is there already.
+    """Write the files for the whole collection, all or none, unless they are up to date.
 
-    Raises ExportError where the disk refuses.
+    Raises ExportError if writing fails.
     """
     from exporters.placed_figure import PlacedFigure
 
@@ -84,7 +90,7 @@ def summarise(collection: Collection) -> Summary:
     tallest_m = max((figure.placement.figure_height_m for figure in figures), default=0.0)
     counts = (len(figures), tallest_m, unplaced, failed)
     before = _before(folder)
-    if before["digest"] == digest.hexdigest() and stand(folder, before["files"]):
+    if before["digest"] == digest.hexdigest() and files_unchanged(folder, before["files"]):
         return Summary(*counts, (), tuple(sorted(left)))
     from exporters.atomic_file import write_text, write_whole
 
@@ -101,7 +107,7 @@ def summarise(collection: Collection) -> Summary:
 
 
 def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Sequence[str]) -> None:
-    """Write all files into an empty folder."""
+    """Write all files into an empty staging folder."""
     from exporters.gis.geopackage import write_geopackage
     from exporters.gis.stac import StacFile, StacItem, stac_file, write_stac
     from exporters.tiles.gather import write_tree
@@ -129,7 +135,7 @@ def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Se
     write_stac(items(), stage, id=identifier, title=collection.title, files=over)
 
 
-def _records(collection: Collection) -> Iterator[tuple[Task, dict[str, Any]]]:
+def _records(collection: Collection) -> Iterator[tuple[RowTask, dict[str, Any]]]:
     ledger = Ledger(collection.folder)
     for task in read_spool(collection.spool):
         record = ledger.read(task.name) or {}
@@ -144,7 +150,7 @@ def _failures(collection: Collection) -> Iterable[tuple[int, str, str]]:
             yield task.number, task.name, str(record.get("error"))
 
 
-def _line(task: Task, record: dict[str, Any]) -> dict[str, Any]:
+def _line(task: RowTask, record: dict[str, Any]) -> dict[str, Any]:
     """A row of the manifest."""
     facts = {"row": task.number, "where": task.where, "name": task.name, "title": task.title}
     done = record["status"] == "done"
@@ -173,7 +179,7 @@ def _state_path(folder: Path) -> Path:
 
 
 def _before(folder: Path) -> dict[str, Any]:
-    """What the last run wrote here; nothing where that is not known."""
+    """Files that the last run wrote here, and their digest; empty where that is not known."""
     with suppress(OSError, DamagedFile):
         found = parse_json(_state_path(folder).read_bytes())
         if isinstance(found, dict) and isinstance(found.get("files"), dict):

@@ -1,4 +1,4 @@
-"""What goes between the parent and the workers: what all rows have in common, a row, and how it went."""
+"""Records exchanged between the parent and the workers: the batch, a task, and its outcome."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from fig2mesh.conversion.request import Request
 
 @dataclass(frozen=True)
 class Batch:
-    """What all rows have in common.
+    """Settings common to all rows.
 
-    roots : where their files are; folder : of the outputs; fresh : nothing that is kept is used
-    overwrite : folders of figures that no batch has begun may be replaced; unplaced : rows need no place
+    roots : of the input files; folder : of the outputs; fresh : ignore stored results
+    overwrite : replace folders that are not from an earlier batch; unplaced : accept rows without a place
     """
 
     roots: Roots
@@ -38,14 +38,14 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Task:
+class RowTask:
     """A row of a collection, ready to be converted.
 
     number, where : as in `Row`; name : of its folder; title : for people
     request : None where there is a problem
-    formats : suffixes besides .glb, without dot; date : as in the row, None without
-    attributes : what the row says besides
-    own_files : fields of the request whose files the row names, not the command line
+    formats : suffixes besides .glb, without dot; date : as in the row, None without one
+    attributes : other values of the row
+    own_files : fields of the request whose files are named by the row, not by the command line
     """
 
     number: int
@@ -62,10 +62,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a row went.
+    """Outcome of a row.
 
-    status : done, or failed; error : one line, None if done; ours : the fault is ours, not the input's
-    lost : its worker could not record it; full : the disk is; unchanged : nothing was to do
+    status : done or failed; error : one line, None if done; internal : internal error, not a fault of the input
+    lost : its worker could not record it; full : the disk is full; unchanged : the outputs were up to date
     seconds : of work; ran, reused : stages; counts : work done, by kind
     """
 
@@ -73,7 +73,7 @@ class Outcome:
     name: str
     status: str
     error: str | None = None
-    ours: bool = False
+    internal: bool = False
     lost: bool = False
     full: bool = False
     unchanged: bool = False

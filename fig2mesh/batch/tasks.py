@@ -1,4 +1,4 @@
-"""Rows with their names, spooled to a file: read once, from then on the same whatever happens to the collection."""
+"""Tasks of the rows, with unique names, spooled to a file so that later changes of the collection have no effect."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from exporters.tiles.tileset import safe_name
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.columns import attributes_of, list_of, request_of
 from fig2mesh.batch.row_files import FILE_FIELDS
-from fig2mesh.batch.task import Problem, Task
+from fig2mesh.batch.task import Problem, RowTask
 from fig2mesh.conversion.fields import as_plain
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
-"""What a row may ask for; .glb is always made."""
+"""Formats that a row may request; .glb is always made."""
 
-LONGEST_NAME: Final = 60
+MAX_NAME: Final = 60
 """Characters of a folder's name; file systems allow 255 bytes, and a character takes up to four."""
 
 TAKEN: Final = ("tileset.json", "index.geojson", "index.gpkg", "figures.czml", "collection.json", "manifest.jsonl")
-"""Files in the folder of the outputs, which no figure may be called."""
+"""Names of files in the output folder, which no figure may have."""
 
 
 class Names:
-    """Which names are taken, in a file that goes away by itself: a million of them take no memory."""
+    """Names that are taken, in a temporary database file, so that a million of them need no memory."""
 
     def __init__(self) -> None:
         self._table = sqlite3.connect("")
@@ -38,8 +38,8 @@ class Names:
         self._table.executemany("insert into names values (?, 0)", [(name.casefold(),) for name in TAKEN])
 
     def take(self, name: str, row: int) -> int | None:
-        """Take a name for a row; the row that has it already, if any (0: it is ours)."""
-        # Some file systems take Anna and anna for the same file.
+        """Reserve a name for a row; return the row that already has it, if any (0: a file of the batch)."""
+        # Some file systems do not distinguish Anna and anna.
         found = self._table.execute("select row from names where name = ?", (name.casefold(),)).fetchone()
         if found is not None:
             return int(found[0])
@@ -47,40 +47,40 @@ class Names:
         return None
 
     def close(self) -> None:
-        """Let the file go."""
+        """Delete the file."""
         self._table.close()
 
 
-def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> Iterator[Task]:
-    """Rows with names: the one that a row gives, else the stem of its picture, with a number where that is taken.
+def tasks_of(rows: Iterable[Row], defaults: Mapping[str, Any] | None = None) -> Iterator[RowTask]:
+    """Tasks of rows, named by the row or else by the stem of its picture, with a number if the name is taken.
 
-    defaults : options for rows that have none, by column
+    defaults : options for rows without them, by column
     """
     with closing(Names()) as names:
         for row in rows:
             yield _task(row, names, defaults or {})
 
 
-def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> Task:
+def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     values = row.values
     problem = None if row.problem is None else _problem(row.where, row.problem)
     given = values.get("name")
     title = (
         str(given) if given is not None else PurePosixPath(str(values.get("figure", ""))).stem or f"row {row.number}"
     )
-    wanted = safe_name(title)[:LONGEST_NAME].strip(".") or "figure"
+    wanted = safe_name(title)[:MAX_NAME].strip(".") or "figure"
     name, number = wanted, 1
     while (other := names.take(name, row.number)) is not None:
         if given is not None and problem is None:
             whose = f"also that of row {other}" if other else "that of a file of the batch"
-            problem = _problem(row.where, f"its name {name} is {whose}; give each row a name of its own")
+            problem = _problem(row.where, f"its name {name} is {whose}; give each row a unique name")
         number += 1
         name = f"{wanted}_{number}"
     return make_task(row, name, title, defaults, problem)
 
 
-def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> Task:
-    """The task of a row; problem : what is known to be wrong with it already."""
+def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> RowTask:
+    """Task of a row; problem : one that has already been found."""
     values = row.values
     formats = list_of(values.get("format", defaults.get("format", ())))
     date = values.get("date", defaults.get("date"))
@@ -91,7 +91,7 @@ def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], prob
             check_formats(formats, "column format")
         except InputError as error:
             request, problem = None, Problem(error.source, error.finding, error.remedy)
-    return Task(
+    return RowTask(
         row.number,
         row.where,
         name,
@@ -106,10 +106,12 @@ def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], prob
 
 
 def check_formats(formats: Iterable[str], where: str) -> None:
-    """Raise InputError, about `where`, for a suffix that a row may not ask for."""
+    """Raise InputError, naming `where`, for a format that a row may not request."""
     for each in formats:
         if each.lower().lstrip(".") not in FORMATS:
-            raise InputError(where, each[:40] or "empty", f"choose from {', '.join(FORMATS)}; .glb is always made")
+            raise InputError(
+                where, f"unknown format {each[:40]!r}", f"choose from {', '.join(FORMATS)}; .glb is always made"
+            )
 
 
 def _problem(where: str, text: str) -> Problem:
@@ -117,8 +119,8 @@ def _problem(where: str, text: str) -> Problem:
     return Problem(where, finding, remedy or "correct the row")
 
 
-def write_spool(tasks: Iterable[Task], path: Path) -> tuple[int, dict[str, int]]:
-    """Write tasks to a file, one a line; returns their number, and in how many rows each attribute has a value."""
+def write_spool(tasks: Iterable[RowTask], path: Path) -> tuple[int, dict[str, int]]:
+    """Write tasks to a file, one per line; return their number, and the number of rows with each attribute."""
     count = 0
     unknown: dict[str, int] = {}
     with path.open("w", encoding="utf-8") as stream:
@@ -131,14 +133,14 @@ def write_spool(tasks: Iterable[Task], path: Path) -> tuple[int, dict[str, int]]
     return count, unknown
 
 
-def read_spool(path: Path) -> Iterator[Task]:
-    """The tasks in a file."""
+def read_spool(path: Path) -> Iterator[RowTask]:
+    """Tasks of a spool file."""
     with path.open(encoding="utf-8") as stream:
         for line in stream:
             yield _task_from(json.loads(line))
 
 
-def _plain(task: Task) -> dict[str, Any]:
+def _plain(task: RowTask) -> dict[str, Any]:
     fields = {each.name: getattr(task, each.name) for each in dataclasses.fields(task)}
     return fields | {
         "request": None if task.request is None else as_plain(task.request),
@@ -146,9 +148,9 @@ def _plain(task: Task) -> dict[str, Any]:
     }
 
 
-def _task_from(fields: dict[str, Any]) -> Task:
+def _task_from(fields: dict[str, Any]) -> RowTask:
     request, problem = fields["request"], fields["problem"]
-    return Task(
+    return RowTask(
         **fields
         | {
             "request": None if request is None else Request(**request),

@@ -1,1 +1,1 @@
-"""The command line: one file a command; nothing heavy is imported before a command runs."""
+"""The command line: one module per command; heavy imports wait until a command runs."""

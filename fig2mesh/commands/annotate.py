@@ -1,4 +1,4 @@
-"""`fig2mesh annotate`: joints and parts by hand, in the browser; nothing heavy is imported before."""
+"""`fig2mesh annotate`: annotate a figure by hand, in the browser; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fig2mesh.terminal import configure_logging
 @request_options(AnnotateRequest)
 @messages
 def annotate(request: AnnotateRequest, quiet: bool, verbose: int) -> None:
-    """Correct joints, silhouette and parts of FIGURE in a browser, with a preview of the solid; Ctrl-C ends it."""
+    """Correct the joints, silhouette and parts of FIGURE in a browser, with a preview in 3D. Stop with Ctrl-C."""
     from fig2mesh.annotate.job import run
 
     configure_logging(quiet, verbose)

@@ -1,4 +1,4 @@
-"""`fig2mesh batch`: a collection of figures, a row each; nothing heavy is imported before."""
+"""`fig2mesh batch`: convert a collection of figures, one per row; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ FROM_USER = (click.core.ParameterSource.COMMANDLINE, click.core.ParameterSource.
 def batch(context: click.Context, /, request: BatchRequest, quiet: bool, verbose: int, **shared: Any) -> int:
     """Convert a collection of figures.
 
-    COLLECTION is a CSV, GeoJSON or GeoPackage with a row for each figure: figure (its picture, seen from COLLECTION's
-    folder), lon and lat (or map, x and y), name, and any option of the main job as a column. Options of the main job
-    given here hold for rows that do not have them.
+    COLLECTION is a CSV, GeoJSON or GeoPackage file with a row for each figure. Its columns are figure (the picture,
+    relative to COLLECTION's folder), lon and lat (or map, x and y), name, and any option of the main command. Options
+    given here are the defaults for rows without that column.
 
-    DIR gets a folder for each figure, a tileset over all, indexes for GIS, a STAC catalogue and manifest.jsonl. Run
-    the same command again after whatever has happened: only what is missing or has changed is made.
+    The output folder gets a folder for each figure, a tileset of all figures, indexes for GIS, a STAC catalogue and
+    manifest.jsonl. After an interruption or a change, run the same command again: it makes only what is missing or
+    outdated.
     """
     from fig2mesh.batch.job import run
 
@@ -43,7 +44,7 @@ def batch(context: click.Context, /, request: BatchRequest, quiet: bool, verbose
 
 
 def _from_anywhere(column: str, value: Any) -> Any:
-    """A value whose paths are seen from here, not from the folder of the collection."""
+    """A value with absolute paths: options are relative to the current folder, not to that of the collection."""
     from fig2mesh.batch.row_files import DATUMS
 
     file = isinstance(value, Path) or (column == "altitude_datum" and value not in DATUMS)

@@ -1,4 +1,4 @@
-"""`fig2mesh doctor`: check that everything that the pipeline needs is there and works."""
+"""`fig2mesh doctor`: check that everything the pipeline needs is installed and works."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from collections.abc import Iterator
 import click
 
 from fig2mesh.conversion.libraries import PACKAGES, version
-from fig2mesh.errors import SYSTEM_LIBRARIES
 
 
 @click.command()
 def doctor() -> None:
-    """Say whether everything that fig2mesh needs is there and works."""
+    """Check that everything fig2mesh needs is installed and works."""
     healthy = True
-    for name, fine, text in examine():
-        healthy &= fine
-        click.echo(f"{'ok  ' if fine else 'FAIL'} {name}: {text}")
+    for name, ok, text in examine():
+        healthy &= ok
+        click.echo(f"{'ok  ' if ok else 'FAIL'} {name}: {text}")
     if not healthy:
         raise SystemExit(1)
 
@@ -29,7 +28,7 @@ def examine() -> Iterator[tuple[str, bool, str]]:
             importlib.import_module(module)
         except Exception as error:
             reason = " ".join(str(error).split())
-            remedy = f"; run: {SYSTEM_LIBRARIES}" if "lib" in reason and ".so" in reason else ""
+            remedy = f"; run: {_install()}" if "lib" in reason and ".so" in reason else ""
             yield distribution, False, f"{reason[:200]}{remedy}"
             continue
         yield distribution, True, version(distribution)
@@ -39,14 +38,21 @@ def examine() -> Iterator[tuple[str, bool, str]]:
 
 
 def _filters() -> tuple[str, bool, str]:
-    """Without libOpenGL importing pymeshlab succeeds and the filters are silently missing."""
+    """Check PyMeshLab's filters: without libOpenGL the import succeeds, but they are missing."""
     try:
         import pymeshlab
 
         usable = hasattr(pymeshlab.MeshSet(), "meshing_close_holes")
     except ImportError:
         usable = False
-    return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
+    return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {_install()}"
+
+
+def _install() -> str:
+    """Command that installs the system libraries."""
+    from fig2mesh.mesh.close_pymeshlab import SYSTEM_LIBRARIES
+
+    return SYSTEM_LIBRARIES
 
 
 def _weights() -> tuple[str, bool, str]:

@@ -1,4 +1,4 @@
-"""`fig2mesh evaluate`: networks on held-out bodies, whole figures on drawings; nothing heavy is imported before."""
+"""`fig2mesh evaluate`: networks on held-out bodies, models of drawings; heavy imports wait until a command runs."""
 
 from __future__ import annotations
 
@@ -9,31 +9,50 @@ import click
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
+SAMPLES = "Folder written by `data build`."
+RUNS = "Folder written by `train`, for networks that are not shipped."
+QUALITY = "Preset for the resolution of all stages."
+MARKDOWN = "Output file, Markdown. Default: stdout."
+
 
 @click.group()
 def evaluate() -> None:
-    """Measure how good the networks are, or the models of a folder of drawings."""
+    """Measure the accuracy of the networks, or of the models of a folder of drawings."""
 
 
 @evaluate.command()
-@click.option("--pack", type=FILE, required=True, metavar="FILE", help="What `data pack` made.")
-@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help="What `data build` made.")
-@click.option("--runs", type=FOLDER, metavar="DIR", help="What `train` made: networks that are not shipped.")
-@click.option("--bodies", type=click.IntRange(1), default=32, show_default=True, metavar="N", help="Dense fields.")
-@click.option("--figures", type=click.IntRange(1), default=12, show_default=True, metavar="N", help="Whole drawings.")
-@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
+@click.option("--pack", type=FILE, required=True, metavar="FILE", help="Pack written by `data pack`.")
+@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help=SAMPLES)
+@click.option("--runs", type=FOLDER, metavar="DIR", help=RUNS)
+@click.option(
+    "--bodies",
+    type=click.IntRange(1),
+    default=32,
+    show_default=True,
+    metavar="N",
+    help="Number of bodies with dense fields.",
+)
+@click.option(
+    "--figures",
+    type=click.IntRange(1),
+    default=12,
+    show_default=True,
+    metavar="N",
+    help="Number of whole drawings.",
+)
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help=MARKDOWN)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 def networks(
     pack: Path, source: Path, runs: Path | None, bodies: int, figures: int, out: Path | None, overwrite: bool
 ) -> None:
-    """The paper's tables beside ours, on clips and people that training never saw."""
+    """Compare the networks with the paper's tables, on clips and people held out of training."""
     from fig2mesh.errors import InputError
     from fig2mesh.training.bodies.pack import load_pack
     from fig2mesh.training.evaluate.networks import Limits
     from fig2mesh.training.evaluate.networks import evaluate as measure
 
     if runs is not None and not runs.is_dir():
-        raise InputError("--runs", f"no folder {runs}", "name the folder that train wrote to, or leave it out")
+        raise InputError("--runs", f"no such directory {runs}", "name the folder written by train, or leave it out")
     _check(() if out is None else (out, out.with_suffix(".png")), overwrite)
     report = measure(load_pack(pack), source, runs, Limits(bodies, figures), lambda line: click.echo(line, err=True))
     if out is not None and runs is not None:
@@ -47,22 +66,24 @@ def networks(
 
 @evaluate.command()
 @click.argument("folder", type=FOLDER, metavar="DIR")
-@click.option("--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True)
+@click.option(
+    "--quality", type=click.Choice(["draft", "standard", "fine"]), default="standard", show_default=True, help=QUALITY
+)
 @click.option(
     "--parts",
     type=click.Choice(["network", "outline"]),
     default="network",
     show_default=True,
-    help="What depths come from: networks, or rules and the outline alone.",
+    help="Method for the shapes of parts: neural networks, or the outline and rules alone.",
 )
-@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Default: to stdout.")
-@click.option("--json", "json_", is_flag=True, help="Unrounded facts instead of a Markdown table.")
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Output file. Default: stdout.")
+@click.option("--json", "json_", is_flag=True, help="Write unrounded values as JSON instead of a Markdown table.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 def figures(folder: Path, quality: str, parts: str, out: Path | None, json_: bool, overwrite: bool) -> None:
-    """Make a model of every figure in DIR and measure it against its drawing and as a solid.
+    """Make a model of every figure in DIR; measure its likeness to the drawing and its quality as a solid.
 
-    DIR holds folders with image.png, keypoints.json and, where needed, mask.png, or pairs of NAME.png and NAME.json.
-    A figure of which no model can be made has the reason in the table, and the exit code is 1.
+    DIR contains folders with image.png, keypoints.json and, where needed, mask.png; or pairs of NAME.png and
+    NAME.json. If no model can be made of a figure, the table gives the reason, and the exit code is 1.
     """
     from fig2mesh.evaluate.figures import as_json, as_markdown, evaluate_figures, find_drawings
     from fig2mesh.settings import settings_for
@@ -77,13 +98,20 @@ def figures(folder: Path, quality: str, parts: str, out: Path | None, json_: boo
 
 
 @evaluate.command()
-@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help="What `data build` made.")
-@click.option("--runs", type=FOLDER, metavar="DIR", help="What `train` made: networks that are not shipped.")
-@click.option("--bodies", type=click.IntRange(1), default=24, show_default=True, metavar="N", help="Each split.")
-@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
+@click.option("--data", "source", type=FOLDER, required=True, metavar="DIR", help=SAMPLES)
+@click.option("--runs", type=FOLDER, metavar="DIR", help=RUNS)
+@click.option(
+    "--bodies",
+    type=click.IntRange(1),
+    default=24,
+    show_default=True,
+    metavar="N",
+    help="Number of bodies of each validation set.",
+)
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help=MARKDOWN)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 def textures(source: Path, runs: Path | None, bodies: int, out: Path | None, overwrite: bool) -> None:
-    """Texture coordinates (table 4) and unseen sides, on clips and people that training never saw."""
+    """Measure texture coordinates (table 4) and unseen sides, on clips and people held out of training."""
     from fig2mesh.training.evaluate.textures import evaluate_textures
 
     _check(() if out is None else (out,), overwrite)
@@ -92,19 +120,26 @@ def textures(source: Path, runs: Path | None, bodies: int, out: Path | None, ove
 
 @evaluate.command()
 @click.option("--figures", type=FOLDER, metavar="DIR", help="Folders with image.png, mask.png, keypoints.json.")
-@click.option("--data", "source", type=FOLDER, metavar="DIR", help="What `data crops` made: its held-out crops.")
-@click.option("--count", type=click.IntRange(1), default=160, show_default=True, metavar="N", help="Crops of a split.")
-@click.option("--blazepose", type=FILE, metavar="TFLITE", help="Score pose_landmark_heavy.tflite on the crops too.")
-@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Markdown; default: to stdout.")
+@click.option("--data", "source", type=FOLDER, metavar="DIR", help="Folder written by `data crops`.")
+@click.option(
+    "--count",
+    type=click.IntRange(1),
+    default=160,
+    show_default=True,
+    metavar="N",
+    help="Number of crops of each validation set.",
+)
+@click.option("--blazepose", type=FILE, metavar="TFLITE", help="Also score pose_landmark_heavy.tflite on the crops.")
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help=MARKDOWN)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 def parse(
     figures: Path | None, source: Path | None, count: int, blazepose: Path | None, out: Path | None, overwrite: bool
 ) -> None:
-    """Silhouettes and joints from bare pictures: annotated drawings, held-out crops, or both."""
+    """Measure silhouettes and joints inferred from annotated drawings, validation crops, or both."""
     from fig2mesh.errors import InputError
 
     if figures is None and source is None:
-        raise InputError("evaluate parse", "nothing to measure", "pass --figures DIR, --data DIR or both")
+        raise InputError("evaluate parse", "nothing to measure", "give --figures DIR, --data DIR or both")
     _check(() if out is None else (out,), overwrite)
     text = ""
     if source is not None:
@@ -119,18 +154,18 @@ def parse(
 
 
 def _check(paths: tuple[Path, ...], overwrite: bool) -> None:
-    """Refuse outputs before the work begins; make their folder."""
+    """Raise OutputError for existing outputs, and make the folder of the others."""
     from fig2mesh.errors import OutputError
 
     for path in paths:
         if path.exists() and not overwrite:
-            raise OutputError(path, "exists", "pass --overwrite or another file")
+            raise OutputError(path, "already exists", "use --overwrite or choose another name")
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def _write(text: str, out: Path | None) -> None:
-    """To a file, whole or not at all; to stdout where there is none."""
+    """Write a text to a file, whole or not at all, or to stdout."""
     if out is None:
         click.echo(text, nl=False)
         return

@@ -1,4 +1,4 @@
-"""`fig2mesh globe`: models on a globe in the browser; nothing heavy is imported before."""
+"""`fig2mesh globe`: models on a globe in the browser; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from fig2mesh.terminal import configure_logging
     type=(str, float, float, float, float),
     multiple=True,
     metavar="IMAGE W S E N",
-    help="Lay a picture on the ground, such as the map that the figures come from: north up, the degrees of its outer "
-    "edges. Repeatable.",
+    help="Drape a picture over the ground, such as the map that the figures come from. North is up; W S E N are its "
+    "outer edges, degrees. Repeatable.",
 )
 @request_options(GlobeRequest)
 @messages
@@ -31,9 +31,9 @@ def globe(
     quiet: bool,
     verbose: int,
 ) -> None:
-    """Show each ASSET on a globe in a browser, offline; Ctrl-C ends it.
+    """Show each ASSET on a globe in a browser, offline. Stop with Ctrl-C.
 
-    ASSET is a placed .glb or .gltf, a tileset.json or its folder, a .czml or a .geojson.
+    ASSET is a georeferenced .glb or .gltf, a tileset.json or its folder, a .czml or a .geojson.
     """
     from fig2mesh.globe.job import run
 

@@ -1,4 +1,4 @@
-"""`fig2mesh inspect`: facts about files."""
+"""`fig2mesh inspect`: summary of the contents of files."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fig2mesh.commands.options import FILE
 
 @click.command()
 @click.argument("files", type=FILE, nargs=-1, required=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of lines.")
 def inspect(files: tuple[Path, ...], as_json: bool) -> None:
-    """Say what is in a GLB, tileset, USD, PLY or OBJ file."""
+    """Summarise the contents of GLB, tileset, USD, PLY and OBJ files."""
     from exporters.inspect import inspect as facts_of
 
     facts = {str(path): facts_of(path) for path in files}

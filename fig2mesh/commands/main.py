@@ -1,14 +1,16 @@
-"""The command line: one file a command; data on stdout, progress and messages on stderr.
+"""The command line: data on stdout, progress and messages on stderr.
 
-Nothing heavy is imported before it is needed: `fig2mesh --help` loads only click.
+Heavy imports wait until a command runs: `fig2mesh --help` loads only click.
 """
 
 from __future__ import annotations
 
+import difflib
+import os.path
 import re
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import click
 
@@ -45,11 +47,11 @@ GROUPS = {
     "Mesh": MeshOptions,
     "Output": OutputOptions,
 }
-"""Sections of the help, and the part of a request that each is about."""
+"""Sections of the help, and the part of a request that each describes."""
 
 
 class MainJobGroup(click.Group):
-    """A group whose first argument may be a figure: then the main job runs."""
+    """A group whose first argument may be a figure: then the main command runs."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -59,7 +61,12 @@ class MainJobGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        # Options of the main job may come before the figure; the group itself only knows these two.
+        if args[:1] == ["help"] and not os.path.exists("help"):
+            args = [*args[1:], "--help"]
+            if args[0] not in (*self.commands, "--help"):
+                raise click.UsageError(_unknown(args[0], self.commands))
+        _check_command(args, self.commands)
+        # Options of the main command may come before the figure; the group itself only knows these two.
         if args and args[0] not in (*self.commands, "-h", "--help", "--version"):
             args = ["make", *args]
         return super().parse_args(ctx, args)
@@ -90,8 +97,8 @@ class MainJobGroup(click.Group):
 def cli() -> None:
     """Turn one drawn human figure into a closed, textured, georeferenced 3D model.
 
-    FIGURE is a picture of one figure. Its silhouette is the transparency or --mask, its joints are --keypoints; what
-    is missing is inferred from the picture.
+    FIGURE is a picture of one figure. Its silhouette is the alpha channel or --mask, its joints are --keypoints;
+    anything missing is inferred from the picture.
     """
 
 
@@ -116,8 +123,25 @@ for command in (
     cli.add_command(command)
 
 
+def _check_command(args: Sequence[str], commands: Collection[str]) -> None:
+    """Raise UsageError for a first word that looks like a misspelt command rather than a missing figure."""
+    if not args or args[0].startswith("-") or args[0] in commands or os.path.exists(args[0]):
+        return
+    word, suffix = os.path.splitext(args[0])
+    followed = len(args) > 1 and not args[1].startswith("-")
+    if suffix and not followed:
+        return
+    if difflib.get_close_matches(word, commands, 1):
+        raise click.UsageError(_unknown(args[0], commands))
+
+
+def _unknown(word: str, commands: Collection[str]) -> str:
+    near = difflib.get_close_matches(os.path.splitext(word)[0], commands, 1)
+    return f"unknown command {word!r:.80}" + (f" (did you mean {near[0]!r}?)" if near else "")
+
+
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line and return its exit code: 0 done, 2 bad usage or input, 1 a fault of ours."""
+    """Run the command line and return its exit code: 0 success, 2 bad usage or input, 1 internal error."""
     from georef.errors import InputError
 
     words = sys.argv[1:] if arguments is None else arguments
@@ -155,7 +179,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def verbosity(words: Sequence[str]) -> int:
-    """How often --verbose is among the words of a command line."""
+    """Number of times that --verbose is among the words of a command line."""
     return sum(word.count("v") if re.fullmatch("-[qv]+", word) else word == "--verbose" for word in words)
 
 

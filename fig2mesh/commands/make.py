@@ -1,4 +1,4 @@
-"""The main job, `fig2mesh FIGURE …`: one figure from its files to its outputs."""
+"""The main command, `fig2mesh FIGURE …`: convert one figure from its files to its outputs."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def run(request: Request, quiet: bool = False) -> None:
     from fig2mesh.conversion.text_file import write_text
     from fig2mesh.counters import counting
 
-    # Everything that can be refused is refused before the work begins.
+    # Whatever can be rejected is rejected before the work begins.
     check_request(request)
     with progress(quiet) as advance, counting() as counts:
         observer = Observer(advance)

@@ -1,4 +1,4 @@
-"""Options of commands, read from the fields of their requests; click alone is imported."""
+"""Options of commands, derived from the fields of their requests; imports nothing but click."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def request_options(request: type, without: Collection[str] = ()) -> Callable[[F
 
     The function gets the request as its first argument, and the values of its other options by name.
 
-    without : names of fields that the command does not offer; they have their defaults
+    without : names of fields that the command does not offer; they keep their defaults
     """
     fields = [field for field in request_fields(request) if field.field not in without]
 
@@ -31,7 +31,7 @@ def request_options(request: type, without: Collection[str] = ()) -> Callable[[F
         def command(*args: Any, **values: Any) -> Any:
             return function(*args, request(**{field.field: values.pop(field.field) for field in fields}), **values)
 
-        # The one applied last is listed first; arguments stand where they are defined.
+        # The one applied last is listed first; arguments come in the order of their definition.
         for field in reversed(fields):
             command = parameter_of(field)(command)
         return command
@@ -40,7 +40,7 @@ def request_options(request: type, without: Collection[str] = ()) -> Callable[[F
 
 
 def parameter_of(field: RequestField) -> Callable[[F], F]:
-    """The decorator that makes a field an option, or an argument, of a command."""
+    """Decorator that adds a field to a command as an option or an argument."""
     facts, kind = field.option, field.type
     if facts.argument:
         return click.argument(field.field, type=value_type(field), metavar=facts.metavar or None)
@@ -66,7 +66,7 @@ def parameter_of(field: RequestField) -> Callable[[F], F]:
 
 
 def value_type(field: RequestField) -> Any:
-    """The type of one value of a field."""
+    """Click type of one value of a field."""
     kind, low, high = field.type, field.option.low, field.option.high
     if kind.choices:
         return click.Choice(kind.choices)
@@ -80,6 +80,6 @@ def value_type(field: RequestField) -> Any:
 
 
 def messages(command: F) -> F:
-    """How much is said."""
-    command = click.option("-v", "--verbose", count=True, help="More messages; twice: tracebacks.")(command)
-    return click.option("-q", "--quiet", is_flag=True, help="Only errors.")(command)
+    """Add the options --quiet and --verbose to a command."""
+    command = click.option("-v", "--verbose", count=True, help="Print more messages; twice: also tracebacks.")(command)
+    return click.option("-q", "--quiet", is_flag=True, help="Print errors only.")(command)

@@ -1,4 +1,4 @@
-"""`fig2mesh parse`: silhouette, parts and joints from a picture; nothing heavy is imported before it runs."""
+"""`fig2mesh parse`: silhouette, parts and joints from a picture; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -18,41 +18,47 @@ JointFormat = Literal["fig2mesh", "coco", "labelme", "supervisely"]
 
 @request_class
 class ParseRequest(FigureFiles):
-    """A picture, and what is to be found in it."""
+    """A picture, and how to parse it."""
 
-    output: Path = option(short="o", metavar="DIR", help="Folder for the three files.")
-    format: JointFormat = option(default="fig2mesh", help="Of keypoints.json; all of them the main job reads.")
-    all: bool = option(default=False, help="Find all figures of a sheet: figures.json and a folder each.")
+    output: Path = option(short="o", metavar="DIR", help="Output folder.")
+    format: JointFormat = option(
+        default="fig2mesh", help="Format of keypoints.json; the main command reads all of them."
+    )
+    all: bool = option(
+        default=False, help="Find all figures of a sheet; write figures.json and a folder for each figure."
+    )
     smallest: float | None = option(
         default=None,
         low=16,
         high=100_000,
         metavar="PX",
-        help="With --all: height of the smallest figures; default: a tenth of the sheet's longer side.",
+        help="With --all: minimum height of figures, pixels. Default: a tenth of the sheet's longer side.",
     )
     overwrite: bool = option(default=False, help="Replace existing files.")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.all and (self.mask, self.keypoints, self.part_labels, self.bbox) != (None,) * 4:
-            raise InputError("--all", "beside --mask, --keypoints, --part-labels or --bbox", "these are of one figure")
+            raise InputError(
+                "--all", "cannot be combined with --mask, --keypoints, --part-labels or --bbox", "leave them out"
+            )
         if self.smallest is not None and not self.all:
-            raise InputError("--smallest", "given without --all", "pass --all as well")
+            raise InputError("--smallest", "requires --all", "add --all")
 
 
 @click.command()
 @request_options(ParseRequest)
 @messages
 def parse(request: ParseRequest, quiet: bool, verbose: int) -> None:
-    """Find the figure in the picture FIGURE: write keypoints.json, mask.png and part_labels.png.
+    """Find the figure in the picture FIGURE; write keypoints.json, mask.png and part_labels.png.
 
-    They are made for the whole picture, to be corrected by hand and given to the main job as --keypoints, --mask and
-    --part-labels; after --all with the --bbox that is said of each figure. What --mask, --keypoints or --part-labels
-    give is kept, and only the rest is inferred.
+    The files cover the whole picture. Correct them by hand if necessary, and give them to the main command as
+    --keypoints, --mask and --part-labels; after --all, add the --bbox printed for each figure. Files given here with
+    --mask, --keypoints or --part-labels are kept, and only the rest is inferred.
     """
     configure_logging(quiet, verbose)
     if request.output.exists() and not request.output.is_dir():
-        raise OutputError(request.output, "is no folder", "give -o a folder")
+        raise OutputError(request.output, "not a directory", "give -o a folder")
     if request.all:
         parse_sheet(request, quiet)
     else:
@@ -67,7 +73,7 @@ def parse_figure(request: ParseRequest) -> None:
 
     there = [name for name in (KEYPOINTS, MASK, PART_LABELS) if (request.output / name).exists()]
     if there and not request.overwrite:
-        raise OutputError(request.output / there[0], "exists", "pass --overwrite or another folder")
+        raise OutputError(request.output / there[0], "already exists", "use --overwrite or choose another folder")
     annotation = annotation_of(read_parsed(**request.reading(), labels=True))
     for path in write_annotation(request.output, annotation, request.figure.name, request.format, request.overwrite):
         log.info("%s", path)
@@ -80,9 +86,9 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
 
     folder, sheet = request.output, request.figure
     if (folder / FIGURES).exists() and not request.overwrite:
-        raise OutputError(folder / FIGURES, "exists", "pass --overwrite or another folder")
+        raise OutputError(folder / FIGURES, "already exists", "use --overwrite or choose another folder")
     view = read_view(sheet, None)
-    # torch takes seconds to load: what can be refused has been.
+    # torch takes seconds to load, so it is imported after all checks.
     from fig2mesh.parse.sheet import figures_in
 
     with progress(quiet) as advance:
@@ -93,4 +99,4 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
         doubts = f"; {'; '.join(figure.found.doubts)}" if figure.found.doubts else ""
         log.info("%s: --bbox %s, confidence %.2f%s", folder / name, box, figure.confidence, doubts)
     if not figures:
-        log.warning("%s: no figure is found; smaller ones are looked for with --smallest PX", sheet)
+        log.warning("%s: no figure found; search for smaller ones with --smallest PX", sheet)

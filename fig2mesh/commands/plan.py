@@ -1,4 +1,4 @@
-"""`fig2mesh plan`: which stages and effects a request needs, and why."""
+"""`fig2mesh plan`: the stages and effects that a request needs, and why."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from fig2mesh.conversion.request import Request
 
 @click.command("plan")
 @request_options(Request)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of lines.")
 @messages
 def plan(request: Request, as_json: bool, quiet: bool, verbose: int) -> None:
-    """Print which stages and effects a request needs, and why; the options are those of the main job."""
+    """Print the stages and effects that a request needs, and why. The options are those of the main command."""
     from fig2mesh.conversion.convert import settings_of
     from fig2mesh.conversion.plan import plan as plan_of
 

@@ -1,4 +1,4 @@
-"""`fig2mesh render`: pictures of drawings and models; nothing heavy is imported before."""
+"""`fig2mesh render`: pictures of drawings and models; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fig2mesh.terminal import configure_logging
 @request_options(RenderRequest)
 @messages
 def render(request: RenderRequest, quiet: bool, verbose: int) -> None:
-    """Make pictures of FIGURE, traced through its part fields, or of a model (.glb .gltf .ply .obj)."""
+    """Render FIGURE by sphere tracing its part fields, or render a model (.glb .gltf .ply .obj)."""
     from fig2mesh.render.job import run
 
     configure_logging(quiet, verbose)

@@ -1,4 +1,4 @@
-"""`fig2mesh tileset`: figures that are there already, gathered into one tileset; nothing heavy is imported before."""
+"""`fig2mesh tileset`: gather converted figures into one tileset; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -14,18 +14,21 @@ from fig2mesh.terminal import configure_logging, log
 
 @request_class
 class TilesetRequest:
-    """How placed figures are gathered into one tileset."""
+    """Options for gathering placed figures into one tileset."""
 
-    output: Path = option(short="o", metavar="DIR", help="Folder of the tileset.")
+    output: Path = option(short="o", metavar="DIR", help="Output folder.")
     visible_from: float | None = option(
         default=None,
         metavar="M",
-        help="Distance from which a figure is drawn, on a screen of 1080 rows; default: about 1,100 times its height.",
+        help="Distance at which clients begin to draw a figure, metres, on a screen 1080 pixels high. Default: about "
+        "1,100 times its height.",
     )
     tiles_version: Literal["1.0", "1.1"] = option(
-        default="1.1", help="1.0: content as .b3dm, for clients that do not know glTF content."
+        default="1.1", help="Version of 3D Tiles. 1.0: content as .b3dm, for clients that do not support glTF content."
     )
-    link: bool = option(default=False, help="Hard links to the .glb files instead of copies, where the disk can.")
+    link: bool = option(
+        default=False, help="Make hard links to the .glb files instead of copies, where the file system supports them."
+    )
     overwrite: bool = option(default=False, help="Replace an existing tileset.")
 
     def __post_init__(self) -> None:
@@ -37,10 +40,11 @@ class TilesetRequest:
 @request_options(TilesetRequest)
 @messages
 def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verbose: int) -> None:
-    """Gather placed figures into one 3D tileset, a tree by place.
+    """Gather placed figures into one 3D Tiles tileset, as a spatial tree.
 
-    ASSET is a .glb made with --lonlat, the tileset of a figure (with its levels of detail), or a folder of such at any
-    depth. Beside the tileset come index.geojson, a map of the figures, and figures.czml, which stands on terrain.
+    ASSET is a .glb made with --lonlat or --map, the tileset of a figure (with its levels of detail), or a folder that
+    contains such files at any depth. Also writes index.geojson, a map of the figures, and figures.czml, in which they
+    stand on the terrain.
     """
     from exporters.tiles.gather import write_figures
     from exporters.tiles.tileset import short_range_warning

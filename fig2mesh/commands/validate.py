@@ -1,4 +1,4 @@
-"""`fig2mesh validate`: files against their specifications."""
+"""`fig2mesh validate`: check files against their specifications."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from fig2mesh.commands.options import FILE
 
 @click.command()
 @click.argument("files", type=FILE, nargs=-1, required=True)
-@click.option("--json", "as_json", is_flag=True, help="One JSON object instead of lines.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of lines.")
 def validate(files: tuple[Path, ...], as_json: bool) -> None:
-    """Check files against their specifications; exit code 2 where there are errors."""
+    """Check files against their specifications. The exit code is 2 if there are errors."""
     from exporters.validate import validate as check
 
     findings = {str(path): check(path) for path in files}

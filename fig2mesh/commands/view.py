@@ -1,4 +1,4 @@
-"""`fig2mesh view`: a figure in the browser; nothing heavy is imported before."""
+"""`fig2mesh view`: a figure in the browser; heavy imports wait until it runs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from fig2mesh.view.request import ViewRequest
 @request_options(ViewRequest, without=("altitude_mode",))
 @messages
 def view(request: ViewRequest, quiet: bool, verbose: int) -> None:
-    """Look at FIGURE from all sides in a browser, which sphere-traces its part fields; Ctrl-C ends it.
+    """View FIGURE from all sides in a browser, which sphere-traces its part fields. Stop with Ctrl-C.
 
-    With a place, --lonlat or --map, it stands there on a globe; that needs CesiumJS.
+    With --lonlat or --map the figure stands on a globe, which needs CesiumJS.
     """
     from fig2mesh.view.job import run
 

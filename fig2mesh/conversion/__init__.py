@@ -1,1 +1,1 @@
-"""From a request to a model and its report: the stages, what runs them, what keeps their results."""
+"""Conversion of a request to a model and its report: the runner of the stages and the stores of their results."""

@@ -1,4 +1,4 @@
-"""From the results of the stages to the asset that exporters write."""
+"""The asset that exporters write, from the results of the stages."""
 
 from __future__ import annotations
 

@@ -38,15 +38,15 @@ if TYPE_CHECKING:
 log = logging.getLogger("fig2mesh")
 
 REQUEST = "request"
-"""Name of the file among the stages' that says what they were made for."""
+"""Name of the file, beside those of the stages, that holds the figure's digest and the settings."""
 
 
 @dataclass(frozen=True)
 class FigureRun:
-    """Stages that were run on a figure.
+    """Results of the stages for one figure.
 
-    figure : without specks, cut down to its silhouette
-    pieces : number of pieces that it is drawn in; specks : number of those that were too small to model
+    figure : without specks, cropped to its silhouette
+    pieces : number of connected pieces of the drawing; specks : number of those that were too small to model
     """
 
     figure: Figure
@@ -57,7 +57,7 @@ class FigureRun:
 
 @dataclass(frozen=True)
 class Conversion:
-    """A model, and all that is known of how it came about."""
+    """A model, with the request, settings and stage results that it was made from."""
 
     request: Request
     settings: Settings
@@ -67,7 +67,7 @@ class Conversion:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user is to be told of the model, one line each."""
+        """Notes for the user about the model, one line each."""
         notes = []
         if self.run.specks:
             notes.append(f"{self.run.specks} specks of the silhouette are too small to model and were left out")
@@ -79,11 +79,11 @@ class Conversion:
 
     @property
     def plan(self) -> Plan:
-        """Which stages and effects the request needed, and why."""
+        """The stages and effects that the request needed, with reasons."""
         return plan(self.settings, self.request.targets)
 
     def _repr_png_(self) -> bytes:
-        """The drawing, and the model from the front, the side and behind, as notebooks show it."""
+        """PNG of the drawing and of the model from the front, the side and behind, for notebooks."""
         from PIL import Image
 
         from fig2mesh.mesh.preview import views_sheet
@@ -104,7 +104,10 @@ def run_stages(
     store: Store | None = None,
     observer: Observer | None = None,
 ) -> FigureRun:
-    """Run what the stage functions `goals` need on a figure, as it was read; height_m : of the model, metres."""
+    """Run the stage functions `goals`, and the stages that they need.
+
+    figure : as it was read; height_m : of the model, metres
+    """
     runner = Runner(settings, store=store or NoStore(), observer=observer or Observer())
     return _run(runner, clean(figure, settings.voxel, settings.picture_px), goals, height_m)
 
@@ -126,10 +129,10 @@ def convert(
 
     Parameters
     ----------
-    figure : what the files of the request hold, where they have been read; default: they are read
-    sheet : the map of the request, where it has been opened; default: it is opened
-    store : where results of stages are looked for, and kept; default: the folder of `request.save_stages`
-    observer : told of each stage
+    figure : the figure, if the files of the request have been read already; default: they are read
+    sheet : the map of the request, if it has been opened already; default: it is opened
+    store : where results of stages are looked up and kept; default: the folder of `request.save_stages`
+    observer : notified of each stage
 
     Raises
     ------
@@ -146,10 +149,10 @@ def convert(
     if store is None and request.save_stages is not None:
         store = folder_store(request.save_stages, drawn, settings, request.resume_from)
     cleaned = clean(drawn, settings.voxel, settings.picture_px)
-    del drawn, figure  # four bytes a pixel of what may be a whole sheet
+    del drawn, figure  # four bytes per pixel of what may be a whole sheet
     start = time.perf_counter()
     placed = place(request, sheet, cleaned.figure, request.figure)
-    if request.somewhere:
+    if request.has_place:
         why = "at --map" if request.map is not None else "at --lonlat"
         observer.note("place", why, placing_s + time.perf_counter() - start)
     runner = Runner(settings, store=store or NoStore(), observer=observer)
@@ -159,36 +162,36 @@ def convert(
 
 
 def settings_of(request: Request) -> Settings:
-    """Settings of a request, with what its outputs need."""
+    """Settings of a request, adapted to its outputs."""
     lods = request.lods
     if lods > 1 and request.resume_from is None and not any(has_levels(target) for target in request.targets):
-        log.info("--lods %d: only 3D Tiles and USD have levels of detail; one is made", lods)
+        log.info("--lods %d: only 3D Tiles and USD have levels of detail; making one", lods)
         lods = 1
     settings = replace(request.settings(), lods=lods)
     return replace(settings, normals=normals_of(settings, request.targets).runs)
 
 
 def check_stages(request: Request) -> None:
-    """Refuse a stage to resume from that is not one, or of which nothing can be kept."""
+    """Reject --resume-from with an unknown stage or without --save-stages."""
     names = [stage.name for stage in STAGES]
     if request.resume_from is not None and request.resume_from not in names:
-        raise InputError("--resume-from", f"{request.resume_from} is no stage", f"choose from {', '.join(names)}")
+        raise InputError("--resume-from", f"unknown stage {request.resume_from!r}", f"choose from {', '.join(names)}")
     if request.resume_from is not None and request.save_stages is None:
-        raise InputError("--resume-from", "no folder of stages", "pass --save-stages DIR as well")
+        raise InputError("--resume-from", "requires --save-stages", "add --save-stages DIR")
 
 
 def folder_store(folder: Path, figure: Figure, settings: Settings, resume_from: str | None) -> FolderStore:
-    """The folder of stages: emptied of other runs, or checked to be of this one where it goes on.
+    """The store of --save-stages: emptied, or, to resume, checked to be of this figure and these settings.
 
-    figure : as it was read; resume_from : name of the first stage that is run again
+    figure : as it was read; resume_from : name of the first stage to run again
     """
-    asked = {"figure": figure_digest(figure), **asdict(settings)}
+    requested = {"figure": figure_digest(figure), **asdict(settings)}
     if resume_from is None:
         for path in folder.glob("*.npz"):
             if path.stem in (REQUEST, *(stage.name for stage in STAGES)):
                 path.unlink()
         store = FolderStore(folder)
-        store.write_file(REQUEST, asked)
+        store.write_file(REQUEST, requested)
         return store
     first = next(number for number, stage in enumerate(STAGES) if stage.name == resume_from)
     before = FolderStore(folder).read_file(REQUEST, dict[str, Any])
@@ -196,11 +199,13 @@ def folder_store(folder: Path, figure: Figure, settings: Settings, resume_from: 
     if STAGES[first].left_out(settings) is not None and unless is not None:
         option = f"--{unless.setting} {unless.value}"
         raise InputError("--resume-from", f"{resume_from} is not run with {option}", "choose another stage")
-    if before.get("figure") != asked["figure"]:
-        raise InputError("--resume-from", "the stages were made from another figure", "pass that figure, or run anew")
+    if before.get("figure") != requested["figure"]:
+        raise InputError(
+            "--resume-from", "the stages were made from another figure", "give that figure, or leave out --resume-from"
+        )
     for stage in STAGES[:first]:
         for name in stage.reads:
-            if before.get(name) != asked[name]:
-                found = f"the stages were made with {name} {before.get(name)}, not {asked[name]}"
+            if before.get(name) != requested[name]:
+                found = f"the stages were made with {name} {before.get(name)}, not {requested[name]}"
                 raise InputError("--resume-from", found, f"start at {stage.name} or earlier")
     return FolderStore(folder, frozenset(stage.name for stage in STAGES[:first]))

@@ -1,4 +1,4 @@
-"""Fields of requests: each says once what it means, which values it takes and what it is called.
+"""Fields of requests: name, meaning and permitted values of each, defined once.
 
 The options of the command line and the columns of collections are read from them; see `fig2mesh.commands.options` and
 `fig2mesh.batch.columns`. Nothing heavy is imported.
@@ -23,15 +23,15 @@ OPTION = "option"
 
 @dataclass(frozen=True)
 class Option:
-    """What the command line says of a field.
+    """Description of a field for the command line.
 
     help : one or two sentences
-    name : of the option and the column, without dashes; "" where it is the field's own
+    name : of the option and the column, without leading dashes; "" for the field's own name
     short : letter, such as "o" for -o
-    metavar : stands for the value in the help; "" where the type tells
+    metavar : placeholder for the value in the help; "" to derive it from the type
     low, high : limits of a number, inclusive
-    default_text : shown as the default, where the field's own default does not tell
-    negative : name of the option that turns a truth value off, where it is not --no-NAME
+    default_text : shown as the default in place of the field's own
+    negative : name of the option that sets a Boolean to false, if not --no-NAME
     argument : whether it is a positional argument of the command line
     column : whether a row of a collection can have it
     shared : whether one value can hold for all rows of a collection
@@ -77,7 +77,7 @@ class FieldType:
     kind : of one item: str, int, float, bool or Path
     choices : the values that a text may have; () where any is allowed
     count : items of a tuple of fixed length; 1 for a single value
-    many : whether it is a tuple of any length
+    many : whether the value is a tuple of any length
     optional : whether it may be None
     """
 
@@ -90,7 +90,7 @@ class FieldType:
 
 @dataclass(frozen=True)
 class RequestField:
-    """A field of a request with all that is known of it. field : its name in Python."""
+    """A field of a request: its name in Python, type, default and option."""
 
     field: str
     type: FieldType
@@ -99,12 +99,12 @@ class RequestField:
 
     @property
     def name(self) -> str:
-        """Of the column, with underscores."""
+        """Name of the column, with underscores."""
         return self.option.name or self.field
 
     @property
     def flag(self) -> str:
-        """Of the option, with dashes."""
+        """Name of the option, with dashes."""
         return "--" + self.name.replace("_", "-")
 
 
@@ -137,7 +137,7 @@ def _type_of(hint: Any) -> FieldType:
 
 
 def check_fields(request: Any) -> None:
-    """Bring the fields of a request to their types, paths given as text included, and check their values.
+    """Convert the fields of a request to their types (text to paths, integers to floats) and check their values.
 
     Raises InputError naming the option.
     """
@@ -197,7 +197,7 @@ def _range(low: float | None, high: float | None) -> str:
 
 
 def parse_value(field: RequestField, raw: object, source: str) -> Any:
-    """A field's value from a cell of a table: a text, a number, a truth value, or a tuple of these.
+    """Parse a field's value from a cell of a table: a text, a number, a truth value, or a tuple of these.
 
     Items of a list in a text are separated by spaces, commas or semicolons. source : named in messages
 
@@ -244,11 +244,11 @@ def _truth(raw: object, source: str) -> bool:
         return True
     if text in ("0", "0.0", "false", "no", "off"):
         return False
-    raise InputError(source, f"{text[:40]!r}", "give true or false")
+    raise InputError(source, f"{text[:40]!r} is not a truth value", "give true or false")
 
 
 def as_plain(request: Any) -> dict[str, Any]:
-    """Fields of a request that differ from their defaults, as JSON holds them; the class takes them as arguments."""
+    """Fields of a request that differ from their defaults, as JSON values that the class accepts as arguments."""
     found: dict[str, Any] = {}
     kind: type = type(request)
     for field in request_fields(kind):

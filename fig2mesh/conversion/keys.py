@@ -1,4 +1,4 @@
-"""Keys of results: digests of all that they are made from, which is input, settings, code, weights and libraries."""
+"""Keys of results: digests of everything they are made from, that is input, settings, code, weights and libraries."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ OTHER_LIBRARIES: Final = ("pillow", "pyvips", "pyproj")
 
 @cache
 def fingerprint() -> str:
-    """Digest of everything besides input and settings that results depend on: our code, the weights, libraries."""
+    """Digest of everything besides input and settings that results depend on: code, weights and libraries."""
     digest = hashlib.sha256()
-    # Not by importing fig2mesh, whose front door imports this module.
+    # Not by importing fig2mesh, whose __init__ imports this module.
     folders = (Path(georef.__path__[0]), Path(exporters.__path__[0]), Path(__file__).parents[1])
     for folder in folders:
         for file in sorted(folder.rglob("*")):
@@ -60,7 +60,7 @@ def stage_keys(stages: Sequence[Stage], settings: Settings, inputs: Mapping[str,
 
 
 def figure_digest(figure: Figure) -> str:
-    """Digest of what a figure holds, 64 hexadecimal digits; its name and where it was cut from do not count."""
+    """Digest of a figure's arrays, 64 hexadecimal digits; its name and its position in the picture do not count."""
     digest = hashlib.sha256()
     for array in (figure.rgba, figure.mask, figure.joints_px, figure.visible, figure.part_labels):
         digest.update(str(array.shape).encode() + array.tobytes())

@@ -1,4 +1,4 @@
-"""What is noted of a conversion while it runs: time, memory, and which stages ran or were read."""
+"""Record of a conversion while it runs: time, memory, and which stages were run, read or left out."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ log = logging.getLogger("fig2mesh")
 
 @dataclass(frozen=True)
 class Timing:
-    """One stage, or another piece of work that a report lists.
+    """Timing of a stage, or of another piece of work that a report lists.
 
     seconds : wall clock
     peak_mb : largest resident size of the process until its end, MiB
-    why : it was run, or not
+    why : reason for running it, or not
     runs : False where its result was read from a store, or not needed
     """
 
@@ -30,7 +30,7 @@ class Timing:
     runs: bool = True
 
     def as_dict(self) -> dict[str, Any]:
-        """As reports have it."""
+        """Fields as they appear in reports."""
         return {
             "stage": self.name,
             "seconds": round(self.seconds, 4),
@@ -42,10 +42,10 @@ class Timing:
 
 @dataclass
 class Observer:
-    """Notes of one conversion.
+    """Timings of one conversion.
 
     advance : called with the name of each piece of work before it begins
-    timings : in the order of their ends
+    timings : in the order in which the work ended
     """
 
     advance: Callable[[str], object] = lambda name: None
@@ -60,12 +60,12 @@ class Observer:
         self.note(name, why, time.perf_counter() - start)
 
     def note(self, name: str, why: str, seconds: float) -> None:
-        """Note work that is done."""
+        """Record work that is done."""
         self.timings.append(Timing(name, seconds, peak_mb(), why))
         log.debug("%s: %.2f s", name, seconds)
 
     def left_out(self, name: str, why: str) -> None:
-        """Note a stage that is not run."""
+        """Record a stage that is not run."""
         self.timings.append(Timing(name, 0.0, peak_mb(), why, runs=False))
 
     @property
@@ -75,7 +75,7 @@ class Observer:
 
 
 def peak_mb() -> float:
-    """Largest resident size of the process so far, MiB; 0 where the system does not tell."""
+    """Largest resident size of the process so far, MiB; 0 where the system does not report it."""
     try:
         import resource
     except ImportError:

@@ -17,11 +17,11 @@ from fig2mesh.errors import OutputError
 
 
 def check_request(request: Request) -> None:
-    """Refuse what can be refused of a request's outputs. Raises OutputError and ExportError."""
+    """Check the outputs of a request before the work begins. Raises OutputError and ExportError."""
     client = profile_named(request.profile)
     client.check_tools()
     for target in request.targets:
-        if not request.somewhere:
+        if not request.has_place:
             refuse_unplaced(target)
     check_outputs(
         request.targets,
@@ -87,12 +87,12 @@ def write(
 
 
 def refuse_unplaced(target: str) -> None:
-    """Raise OutputError for an output that says nothing without a place on the earth."""
+    """Raise OutputError for an output whose format needs a place on the earth."""
     if needs_place(target):
         kind = "3D Tiles need" if is_tileset(target) else f"{Path(target).suffix} needs"
-        raise OutputError(target, f"{kind} a place on earth", "pass --lonlat LON LAT or --map SHEET")
+        raise OutputError(target, f"{kind} a place on the earth", "give --lonlat LON LAT or --map SHEET")
 
 
 def near_note(request: Request, height_m: float) -> str | None:
-    """One line where a tileset is drawn from too near for a figure of that height, else None."""
+    """Warning that a tileset's figure of that height is drawn only from too near, in one line; else None."""
     return short_range_warning(request.visible_from, height_m) if any(map(is_tileset, request.targets)) else None

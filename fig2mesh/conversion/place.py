@@ -1,6 +1,6 @@
-"""Where the figure of a request stands: at --lonlat, or where a georeferenced map shows it.
+"""Placement of a request's figure: at --lonlat, or where a georeferenced map shows it.
 
-`open_map` refuses what can be refused before the figure is read; `place` is for a figure that has been read.
+`open_map` checks what can be checked before the figure is read; `place` needs the figure.
 """
 
 from __future__ import annotations
@@ -28,8 +28,12 @@ log = logging.getLogger("fig2mesh")
 
 @dataclass(frozen=True)
 class Placed:
-    """placement : None where no place was asked for; height_m : of the figure; map : what the report says of the map,
-    None without; notes : what the user is to be told, one line each; summary : the map in one line, may be empty."""
+    """Placement of a figure.
+
+    placement : None where no place was requested; height_m : of the figure; map : facts of the map for the report,
+        None without a map
+    notes : for the user, one line each; summary : of the map, one line, may be empty
+    """
 
     placement: GeoPlacement | None
     height_m: float
@@ -39,14 +43,14 @@ class Placed:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """What is kept in the outputs of the map that a place is from."""
+        """Facts of the map for the metadata of the outputs; empty without a map."""
         if self.map is None:
             return {}
         return {"map": {key: self.map[key] for key in ("sheet", "pixel", "method", "rmse_m")}}
 
 
 def log_place(placed: Placed, *more: str | None) -> None:
-    """Log what the user is to know of a place."""
+    """Log the summary of a place, and its notes as warnings."""
     if placed.summary:
         log.info("%s", placed.summary)
     for note in (*placed.notes, *more):
@@ -55,20 +59,20 @@ def log_place(placed: Placed, *more: str | None) -> None:
 
 
 def open_map(request: PlaceRequest) -> MapSheet | None:
-    """Check the options of a place, and read the sheet that they name, if any."""
+    """Check the options of a place, and read the map sheet that they name, if any."""
     if request.map is None:
         for name, given in (("--at", request.at), ("--map-crs", request.map_crs)):
             if given is not None:
-                raise InputError(name, "given without a map", "pass --map SHEET as well")
+                raise InputError(name, "requires --map", "add --map SHEET")
         if request.size_from == "map" or request.map_transform != "auto":
             name = "--size-from map" if request.size_from == "map" else "--map-transform"
-            raise InputError(name, "given without a map", "pass --map SHEET as well")
+            raise InputError(name, "requires --map", "add --map SHEET")
         placement_of(request)
         return None
     if request.lonlat is not None:
-        raise InputError("--map", "beside --lonlat", "give the place once")
+        raise InputError("--map", "cannot be combined with --lonlat", "give one of the two")
     if request.size_from == "map" and request.height_m is not None:
-        raise InputError("--size-from map", "beside --height-m", "give the size once")
+        raise InputError("--size-from map", "cannot be combined with --height-m", "give one of the two")
     # Everything but the place itself is checked as for a place that is known.
     placement_of(request, (0.0, 0.0), dry=True)
     from georef.mapsheet import read_sheet
@@ -77,7 +81,7 @@ def open_map(request: PlaceRequest) -> MapSheet | None:
 
 
 def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: Path) -> Placed:
-    """The place and size of a figure.
+    """Place and size of a figure.
 
     sheet : from `open_map`
     path : the picture of the figure
@@ -94,21 +98,22 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
         pixel, source = foot_on_picture(figure), f"{path}: the feet"
     else:
         found = f"{path.name} is not the picture of {sheet.file.name}"
-        raise InputError("--map", found, "pass --at X Y, the pixel of the sheet where the feet are")
-    spot = sheet.place(*pixel, source=source)
-    notes += spot.notes
+        raise InputError("--map", found, "give --at X Y, the pixel of the sheet where the feet are")
+    location = sheet.place(*pixel, source=source)
+    notes += location.notes
     height = FIGURE_HEIGHT if request.height_m is None else request.height_m
     if request.size_from == "map":
-        height = height_on_picture(figure) * spot.up_m
+        height = height_on_picture(figure) * location.up_m
         if not drawn_on_it:
-            notes.append(f"--size-from map: a pixel of {path.name} is taken for a pixel of the sheet")
-    placement = placement_of(request, (spot.lon_deg, spot.lat_deg), height=height, viewer_deg=spot.down_bearing_deg)
-    record = _record(request, sheet, spot, pixel)
-    return Placed(placement, height, record, tuple(notes), _summary(sheet, spot))
+            notes.append(f"--size-from map: a pixel of {path.name} is assumed to be as large as a pixel of the sheet")
+    lonlat = location.lon_deg, location.lat_deg
+    placement = placement_of(request, lonlat, height=height, viewer_deg=location.down_bearing_deg)
+    record = _record(request, sheet, location, pixel)
+    return Placed(placement, height, record, tuple(notes), _summary(sheet, location))
 
 
 def clamp_note(request: PlaceRequest, targets: Sequence[str]) -> str | None:
-    """One line on outputs that cannot follow terrain, where that is asked for."""
+    """Warning about outputs that cannot follow terrain, in one line, for --altitude-mode clamp; else None."""
     if request.altitude_mode != "clamp":
         return None
     others = [target for target in targets if not target.lower().endswith(".czml")]
@@ -125,7 +130,7 @@ def placement_of(
     viewer_deg: float = 180.0,
     dry: bool = False,
 ) -> GeoPlacement | None:
-    """The placement at a place, by default --lonlat; None without one. dry: heights are not converted."""
+    """Placement at `lonlat`, by default --lonlat; None without either. dry : do not convert heights."""
     heading = parse_facing(request.facing, viewer_deg=viewer_deg)
     height_m = height if height is not None else FIGURE_HEIGHT if request.height_m is None else request.height_m
     if not 0.001 <= height_m <= 1e6:
@@ -136,12 +141,14 @@ def placement_of(
     if lonlat is None:
         if altitude or datum != "ellipsoid" or request.altitude_mode != "absolute":
             option = "--altitude" if altitude or datum != "ellipsoid" else "--altitude-mode"
-            raise InputError(option, "given without a place", "pass --lonlat LON LAT as well, or --map SHEET")
+            raise InputError(option, "requires a place", "add --lonlat LON LAT or --map SHEET")
         return None
     if not -12_000 <= altitude <= 1e7:
         raise InputError("--altitude", f"{altitude:g} m", "give metres above the datum, at most 10,000 km")
     if request.altitude_mode == "clamp" and datum != "ellipsoid":
-        raise InputError("--altitude-mode clamp", f"beside --altitude-datum {datum}", "heights above terrain have none")
+        raise InputError(
+            "--altitude-mode clamp", f"cannot be combined with --altitude-datum {datum}", "leave out the datum"
+        )
     place = GeoPlacement(*lonlat, altitude, "ellipsoid", heading, height_m, request.altitude_mode)
     if dry:
         return place
@@ -150,8 +157,8 @@ def placement_of(
     return GeoPlacement(place.lon_deg, place.lat_deg, metres, name, heading, height_m, request.altitude_mode)
 
 
-def _record(request: PlaceRequest, sheet: MapSheet, spot: SheetPlace, pixel: tuple[float, float]) -> dict[str, Any]:
-    """What the report says of the map; lengths in metres on the ground."""
+def _record(request: PlaceRequest, sheet: MapSheet, location: SheetPlace, pixel: tuple[float, float]) -> dict[str, Any]:
+    """Facts of the map for the report; lengths in metres on the ground."""
     quality = sheet.quality
     assert request.map is not None
     return {
@@ -168,27 +175,30 @@ def _record(request: PlaceRequest, sheet: MapSheet, spot: SheetPlace, pixel: tup
         "residuals_m": [] if quality is None else list(quality.residuals_m),
         "left_out_m": [] if quality is None else list(quality.leave_one_out_m),
         "pixel": list(pixel),
-        "lonlat": [spot.lon_deg, spot.lat_deg],
-        "metres_per_pixel": {"up": spot.up_m, "across": spot.across_m},
-        "up_bearing_deg": spot.up_bearing_deg,
-        "stretch": spot.stretch,
-        "mirrored": spot.mirrored,
-        "inside_hull": None if spot.outside_m is None else spot.outside_m == 0.0,
-        "outside_m": spot.outside_m,
+        "lonlat": [location.lon_deg, location.lat_deg],
+        "metres_per_pixel": {"up": location.up_m, "across": location.across_m},
+        "up_bearing_deg": location.up_bearing_deg,
+        "stretch": location.stretch,
+        "mirrored": location.mirrored,
+        "inside_hull": None if location.outside_m is None else location.outside_m == 0.0,
+        "outside_m": location.outside_m,
         "size_from": request.size_from,
-        "notes": [*sheet.notes, *spot.notes],
+        "notes": [*sheet.notes, *location.notes],
     }
 
 
-def _summary(sheet: MapSheet, spot: SheetPlace) -> str:
-    where = f"{spot.lon_deg:.6f} {spot.lat_deg:.6f}, {spot.up_m:.4g} m a pixel, up is {spot.up_bearing_deg:.1f}°"
+def _summary(sheet: MapSheet, location: SheetPlace) -> str:
+    where = (
+        f"{location.lon_deg:.6f} {location.lat_deg:.6f}, {location.up_m:.4g} m per pixel, "
+        f"up is {location.up_bearing_deg:.1f}°"
+    )
     if sheet.quality is None:
         return f"{sheet.file}: {where}"
     quality, count = sheet.quality, len(sheet.pixels)
     if quality.leave_one_out_rmse_m is not None:
-        fit = f"each missed by {quality.leave_one_out_rmse_m:.3g} m (RMS) when left out"
+        fit = f"RMSE {quality.leave_one_out_rmse_m:.3g} m of points left out one by one"
     elif quality.degrees_of_freedom == 0:
-        fit = "no more than it needs, so nothing checks it"
+        fit = "the minimum, so the fit cannot be checked"
     else:
-        fit = f"missed by {quality.rmse_m:.3g} m (RMS)"
-    return f"{sheet.file}: {where}; {sheet.method} of {count} control points, {fit}"
+        fit = f"RMSE {quality.rmse_m:.3g} m"
+    return f"{sheet.file}: {where}; {sheet.method} fitted to {count} control points, {fit}"

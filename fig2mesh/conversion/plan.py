@@ -1,4 +1,4 @@
-"""Which stages and effects a request needs, and why the others are left out."""
+"""Plan of a request: the stages and effects that it needs, and why the others are left out."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fig2mesh.stages.stage import Stage
 from fig2mesh.stages.table import STAGES
 
 WITH_NORMALS: Final = (".usd", ".usda", ".usdc", ".usdz", ".ply", ".obj")
-"""Formats whose files have normals in any case: their readers light everything."""
+"""Formats whose files always have normals, because their readers light every surface."""
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A stage or an effect; runs : whether it is needed; why : what needs it, or why nothing does."""
+    """A stage or an effect; runs : whether it is needed; why : the reason."""
 
     name: str
     runs: bool
@@ -26,14 +26,14 @@ class Planned:
 
 @dataclass(frozen=True)
 class Plan:
-    """stages : in their order; effects : on the model."""
+    """stages : in the order in which they run; effects : on the model."""
 
     stages: tuple[Planned, ...]
     effects: tuple[Planned, ...]
 
 
 def plan(settings: Settings, outputs: Sequence[str], stages: Sequence[Stage] = STAGES) -> Plan:
-    """What a request needs.
+    """Plan the stages and effects for some outputs.
 
     outputs : as `-o` takes them
     """
@@ -52,7 +52,7 @@ def normals_of(settings: Settings, outputs: Sequence[str]) -> Planned:
     if formats:
         return Planned("normals", True, f"{' '.join(formats)} files are lit by their readers")
     if settings.textures != "none":
-        return Planned("normals", True, "the bake asks which way the surface faces")
+        return Planned("normals", True, "the bake needs the direction of the surface")
     return Planned("normals", False, "nothing is lit")
 
 

@@ -26,7 +26,7 @@ REMEDY = "run again with --save-stages and without --resume-from"
 
 
 def write_record(path: Path, title: str, value: object) -> None:
-    """Write a tree to a file, whole or not at all; title : what it is, checked by `read_record`.
+    """Write a tree to a file, whole or not at all; title : checked by `read_record`.
 
     Raises OSError where the disk refuses.
     """
@@ -73,7 +73,7 @@ def _pack(value: Any, arrays: dict[str, Any]) -> Any:
         return {"dict": [[key, _pack(item, arrays)] for key, item in value.items()]}
     if value is None or isinstance(value, bool | int | float | str):
         return {"value": value}
-    raise TypeError(f"{type(value).__name__} cannot be kept in a stage file")
+    raise TypeError(f"{type(value).__name__} cannot be stored in a stage file")
 
 
 NODE = {"record": str, "fields": dict, "array": str, "tuple": list, "dict": [list]}
@@ -100,8 +100,8 @@ def _unpack(tree: Any, arrays: dict[str, Any], classes: dict[str, type]) -> Any:
         return tuple(_unpack(item, arrays, classes) for item in tree["tuple"])
     if "dict" in tree:
         if not all(len(pair) == 2 and not isinstance(pair[0], dict | list) for pair in tree["dict"]):
-            raise DamagedFile("a dictionary that is none")
+            raise DamagedFile("an invalid dictionary")
         return {key: _unpack(item, arrays, classes) for key, item in tree["dict"]}
     if "value" not in tree or isinstance(tree["value"], dict | list):
-        raise DamagedFile("a value that is none")
+        raise DamagedFile("an invalid value")
     return tree["value"]

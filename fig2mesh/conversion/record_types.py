@@ -1,4 +1,4 @@
-"""Whether the fields of a record hold what their annotations say: records out of files are not to be trusted."""
+"""Check of a record's fields against their annotations: records read from files are not trusted."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _needed(kind: type) -> frozenset[str]:
 def check_fields(kind: type, fields: Mapping[str, Any]) -> None:
     """Raise DamagedFile unless the fields are those of a dataclass and each fits its annotation.
 
-    Arrays have to have the type that is annotated; their shapes are for the record itself to check.
+    Arrays must have the annotated dtype; the record itself checks their shapes.
     """
     hints = _hints(kind)
     known = {field.name for field in dataclasses.fields(kind)}

@@ -1,4 +1,4 @@
-"""`--report`: what was made, how long it took, and how good it is by measures taken on the result itself."""
+"""The report of `--report`: files, timings, and measures taken on the result itself."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fig2mesh.stages.solid import solid
 def make_report(
     done: Conversion, outputs: Sequence[Path], observer: Observer, counts: Mapping[Work, int]
 ) -> dict[str, Any]:
-    """What `--report` says of a conversion and the files written; these and the inputs with their digests.
+    """Report of a conversion and of the files written, with digests of inputs and outputs.
 
     The silhouette and the front view are measured on the finest textured mesh as it goes to the exporters, rendered
     orthographically at the drawing's resolution.
@@ -57,7 +57,7 @@ def make_report(
 
 
 def model_measures(done: Conversion) -> dict[str, Any]:
-    """How good a model is, by measures taken on the asset that goes to the exporters."""
+    """Measures of a model, taken on the asset that goes to the exporters."""
     asset, figure, results = done.asset, done.run.figure, done.run.results
     transform = asset_from_figure(results[lift], results[simplify][0].vertices, done.placed.height_m)
     pixel, origin_px = on_drawing(image_frame(figure), transform)

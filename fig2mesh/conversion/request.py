@@ -1,4 +1,4 @@
-"""A request: everything that a conversion is asked for, as a value.
+"""A request: all inputs and options of a conversion, as a checked value.
 
 The options of the command line and the columns of collections are read from these fields. Nothing heavy is imported.
 """
@@ -24,21 +24,21 @@ Device = Literal["auto", "cpu", "cuda"]
 
 @request_class
 class FigureFiles:
-    """Files of one drawn figure; what none of them gives is inferred from the picture."""
+    """Files of one drawn figure; anything they do not provide is inferred from the picture."""
 
     figure: Path = option(kw_only=False, help="The picture.", argument=True, shared=False)
     mask: Path | None = option(
         default=None,
         metavar="PNG",
         shared=False,
-        help="Silhouette, bright on dark; default: the alpha channel, or inferred.",
+        help="Silhouette, bright on dark. Default: the alpha channel, or else inferred.",
     )
     keypoints: Path | None = option(
-        default=None, metavar="JSON", shared=False, help="The 21 joints; default: inferred."
+        default=None, metavar="JSON", shared=False, help="The 21 joints. Default: inferred."
     )
-    part_labels: Path | None = option(default=None, metavar="PNG", shared=False, help="Part label of every pixel.")
+    part_labels: Path | None = option(default=None, metavar="PNG", shared=False, help="Part label of each pixel.")
     bbox: tuple[int, int, int, int] | None = option(
-        default=None, metavar="X0 Y0 X1 Y1", shared=False, help="Part of the picture that holds the figure."
+        default=None, metavar="X0 Y0 X1 Y1", shared=False, help="Bounding box of the figure in the picture, pixels."
     )
 
     def __post_init__(self) -> None:
@@ -57,55 +57,57 @@ class FigureFiles:
 
 @request_class
 class PlaceRequest:
-    """Where the figure stands, which way it looks and how large it is."""
+    """Place, heading and size of the figure."""
 
     lonlat: tuple[float, float] | None = option(
-        default=None, metavar="LON LAT", shared=False, help="Place on WGS 84, degrees."
+        default=None, metavar="LON LAT", shared=False, help="Longitude and latitude of the figure, WGS 84 degrees."
     )
     map: Path | None = option(
         default=None,
         metavar="SHEET",
-        help="Place from a georeferenced map instead: its picture with tags, a world file, .points or a IIIF "
-        "annotation beside it; or one of these files.",
+        help="Take the place from a georeferenced map: a GeoTIFF; a picture with a world file, a .points file or a "
+        "IIIF georeference annotation next to it; or one of these files.",
     )
     at: tuple[float, float] | None = option(
         default=None,
         metavar="X Y",
         shared=False,
-        help="Pixel of SHEET where the feet are; default: where they are drawn, if FIGURE is the sheet.",
+        help="Pixel of SHEET where the feet stand. Default: the feet as drawn, if FIGURE is the sheet itself.",
     )
     size_from: Literal["height", "map"] = option(
-        default="height", help="map: as large on the globe as drawn on the map, in place of --height-m."
+        default="height",
+        help="map: make the figure as large on the globe as it is drawn on the map, instead of --height-m.",
     )
     map_transform: MapTransform = option(
-        default="auto", help="Fitted to control points; auto: as the file says, or affine."
+        default="auto",
+        help="Transformation fitted to the control points. auto: the one named in the file, or else affine.",
     )
     map_crs: str | None = option(
         default=None,
         metavar="CRS",
-        help="Reference system of the sheet, such as EPSG:2056, where its files name none; for points in longitude "
-        "and latitude, the projection to fit in.",
+        help="Coordinate reference system of the sheet, such as EPSG:2056, if its files name none. For control points "
+        "in longitude and latitude: the projection to fit in.",
     )
     facing: str = option(
         default="viewer",
         metavar="N|NE|…|DEG|viewer",
-        help="Compass bearing of the nose; viewer: towards the reader of the map, south without --map.",
+        help="Compass bearing of the nose. viewer: towards the reader of the map, or south without --map.",
     )
     height_m: float | None = option(
-        default=None, metavar="M", default_text=str(FIGURE_HEIGHT), help="Height of the figure."
+        default=None, metavar="M", default_text=str(FIGURE_HEIGHT), help="Height of the figure, metres."
     )
-    altitude: float = option(default=0.0, metavar="M", help="Height of the feet.")
+    altitude: float = option(default=0.0, metavar="M", help="Height of the feet above the datum, metres.")
     altitude_datum: str = option(
-        default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", help="What --altitude is measured from."
+        default="ellipsoid", metavar="ellipsoid|egm96|GRIDFILE", help="Vertical datum of --altitude."
     )
     altitude_mode: Literal["absolute", "clamp"] = option(
         default="absolute",
-        help="clamp: --altitude is above the terrain that a client shows, where the format can say so (CZML).",
+        help="clamp: --altitude is above the client's terrain, in formats that support this (CZML).",
     )
 
     @property
-    def somewhere(self) -> bool:
-        """Whether a place is asked for."""
+    def has_place(self) -> bool:
+        """Whether a place is requested."""
         return self.lonlat is not None or self.map is not None
 
     @property
@@ -116,25 +118,27 @@ class PlaceRequest:
 
 @request_class
 class InferenceOptions:
-    """How a figure becomes fields and colours."""
+    """Options for inferring fields and colours from a figure."""
 
-    quality: Quality = option(default="standard", help="Resolution of all stages at once.")
-    parts: Parts = option(default="network", help="What depths come from: networks, or rules and the outline alone.")
+    quality: Quality = option(default="standard", help="Preset for the resolution of all stages.")
+    parts: Parts = option(
+        default="network", help="Method for the shapes of parts: neural networks, or the outline and rules alone."
+    )
     textures: Textures | None = option(
         default=None,
-        help="Unseen sides as networks paint them (default), or in the plain colours of what is drawn before them "
-        "(default with --parts outline); or no texture at all.",
+        help="Colours of sides that the drawing does not show: painted by neural networks (default), or plain colours "
+        "taken from the drawing (default with --parts outline). none: no texture at all.",
     )
     contours: Contours = option(
         default="keep",
-        help="The line drawn around the figure: on the surface, like the drawing from the front and a dark band from "
-        "the side; or left away, for clients that draw silhouettes.",
+        help="keep: bake the line drawn round the figure into the texture; from the side it is a dark band. drop: "
+        "leave it out, for clients that draw outlines themselves.",
     )
-    device: Device = option(default="auto", help="Where networks run.")
-    seed: int = option(default=0, low=0, high=MAX_SEED, metavar="N", help="Of everything random.")
+    device: Device = option(default="auto", help="Device on which neural networks run.")
+    seed: int = option(default=0, low=0, high=MAX_SEED, metavar="N", help="Seed of all random choices.")
 
     def settings(self) -> Settings:
-        """The preset of the quality with what is asked for besides. Raises InputError where the device is missing."""
+        """The preset of the quality, with the options given. Raises InputError where the device is missing."""
         given = {each.name: getattr(self, each.name, None) for each in fields(Settings)}
         given["light"] = self._light()
         return settings_for(self.quality, **{**given, "device": torch_device(self.device)})
@@ -145,31 +149,43 @@ class InferenceOptions:
 
 @request_class
 class MeshOptions:
-    """How fields and colours become a textured mesh."""
+    """Options for meshing and texturing."""
 
     triangles: int | None = option(
-        default=None, low=200, high=2_000_000, metavar="N", help="Triangles of the finest mesh."
+        default=None,
+        low=200,
+        high=2_000_000,
+        metavar="N",
+        help="Number of triangles of the finest mesh. Default: by --quality.",
     )
-    texture_size: int | None = option(default=None, low=64, high=8192, metavar="PX", help="Texels a side.")
-    lods: int = option(default=1, low=1, high=5, metavar="N", help="Levels of detail (3D Tiles, USD).")
-    mesher: Mesher = option(default="ball-pivot", help="How the surface becomes a mesh.")
-    closing: Closing = option(default="pymeshlab", help="What closes the holes that ball pivoting leaves.")
+    texture_size: int | None = option(
+        default=None,
+        low=64,
+        high=8192,
+        metavar="PX",
+        help="Width and height of the texture, texels. Default: by --quality.",
+    )
+    lods: int = option(
+        default=1, low=1, high=5, metavar="N", help="Number of levels of detail (3D Tiles and USD only)."
+    )
+    mesher: Mesher = option(default="ball-pivot", help="Meshing method.")
+    closing: Closing = option(default="pymeshlab", help="Method for closing the holes left by ball pivoting.")
     effects: tuple[Effect, ...] = option(
         default=(),
         name="effect",
-        help="light: clients light the surface (default without texture); none: they show it as it is. Repeatable.",
+        help="light: clients light the surface (default without texture); none: they show it unlit. Repeatable.",
     )
 
 
 @request_class
 class OutputOptions:
-    """What is written, for whom, and what is kept besides."""
+    """Outputs, and options for writing them."""
 
     name: str | None = option(
         default=None,
         metavar="TEXT",
         shared=False,
-        help="What the figure is called in the outputs; default: FIGURE's stem.",
+        help="Name of the figure in the outputs. Default: FIGURE without its suffix.",
     )
     outputs: tuple[str, ...] = option(
         default=(),
@@ -177,54 +193,62 @@ class OutputOptions:
         short="o",
         metavar="OUT",
         column=False,
-        help=".glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson, or a folder / tileset.json for 3D Tiles; "
-        "repeatable. Default: FIGURE's stem + .glb in the current folder.",
+        help="Output file: .glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson; or a folder or tileset.json for "
+        "3D Tiles. Repeatable. Default: FIGURE with the suffix .glb, in the current folder.",
     )
     profile: ProfileName | None = option(
         default=None,
-        help="Write for one client: cesiumjs compressed (also with KTX 2 texture), blender and qgis without "
-        "extensions, omniverse as binary USD. Default: what every client takes.",
+        help="Write for one client: cesiumjs with compression (-ktx2: also KTX 2 textures), blender and qgis without "
+        "extensions, omniverse as binary USD. Default: files that every client reads.",
     )
     visible_from: float | None = option(
         default=None,
         metavar="M",
         column=False,
-        help="Distance from which the figure is drawn, 3D Tiles only; default: about 1,100 times its height.",
+        help="Distance at which clients begin to draw the figure, metres (3D Tiles only). Default: about 1,100 times "
+        "its height.",
     )
     tiles_version: Literal["1.0", "1.1"] = option(
-        default="1.1", column=False, help="Of 3D Tiles; 1.0: content as .b3dm, for older clients."
+        default="1.1", column=False, help="Version of 3D Tiles. 1.0: content as .b3dm, for older clients."
     )
-    credit: str = option(default="", metavar="TEXT", help="Attribution, kept in the outputs.")
+    credit: str = option(default="", metavar="TEXT", help="Attribution to store in the outputs.")
     evidence: bool = option(
-        default=True, help="Part names and how much of each the drawing showed, as glTF feature ids."
+        default=True, help="Store part names, and the share of each part that the drawing shows, as glTF feature ids."
     )
-    save_stages: Path | None = option(default=None, metavar="DIR", column=False, help="Keep what each stage made.")
+    save_stages: Path | None = option(
+        default=None, metavar="DIR", column=False, help="Save the result of each stage in DIR."
+    )
     resume_from: str | None = option(
-        default=None, metavar="STAGE", column=False, help="Start at STAGE with what --save-stages DIR holds."
+        default=None,
+        metavar="STAGE",
+        column=False,
+        help="Start at STAGE, with the earlier results in --save-stages DIR.",
     )
     report: Path | None = option(
-        default=None, metavar="JSON", column=False, help="Seconds, memory, measures, versions, hashes."
+        default=None, metavar="JSON", column=False, help="Write a report: timings, memory, measures, versions, hashes."
     )
     overwrite: bool = option(default=False, column=False, help="Replace existing outputs.")
 
 
 @request_class
 class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOptions):
-    """One figure from its files to its outputs. Raises InputError for values that no conversion can have."""
+    """The request to convert one figure from its files to its outputs. Raises InputError for invalid values."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self._light()
+        if "-" in self.outputs:
+            raise InputError("-o -", "writing to stdout is not supported", "name a file or a folder")
         check_visible_from(self.visible_from)
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """The outputs, with the default where none is named."""
+        """The outputs, or the default output if none is named."""
         return self.outputs or (self.figure.stem + ".glb",)
 
     @property
     def title(self) -> str:
-        """What the figure is called."""
+        """Name of the figure."""
         return self.name or self.figure.stem
 
     @property
@@ -236,14 +260,14 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
     def _light(self) -> bool | None:
         others = [effect for effect in self.effects if effect != "none"]
         if "none" in self.effects and others:
-            raise InputError("--effect", f"none beside {others[0]}", "give either none or the effects wanted")
+            raise InputError("--effect", f"none cannot be combined with {others[0]}", "give one of them")
         return "light" in self.effects if self.effects else None
 
 
 def check_visible_from(distance_m: float | None) -> None:
-    """Refuse a distance to be seen from that is none. Raises InputError."""
+    """Raise InputError unless a value of --visible-from is a positive distance, or None."""
     if distance_m is not None and not 0 < distance_m < 1e9:
-        raise InputError("--visible-from", f"{distance_m:g} m", "give a distance in metres")
+        raise InputError("--visible-from", f"{distance_m:g} m", "give a positive distance in metres")
 
 
 def torch_device(name: str) -> str:
@@ -254,5 +278,5 @@ def torch_device(name: str) -> str:
 
     available = torch.cuda.is_available()
     if name == "cuda" and not available:
-        raise InputError("--device", "no usable CUDA device", "pass --device cpu or auto")
+        raise InputError("--device", "no usable CUDA device", "use --device cpu or auto")
     return "cuda" if available else "cpu"

@@ -1,4 +1,4 @@
-"""The one runner of stages: it makes what is asked for, with as little work as the store allows."""
+"""The runner of stages: makes the requested results with as little work as the store allows."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the first stages need besides settings.
+    """Inputs of the first stages, besides settings.
 
     figure : without specks, see `fig2mesh.parts.pieces`
-    pieces : number of pieces that the figure is drawn in
+    pieces : number of connected pieces of the drawing
     height_m : of the model, metres
     """
 
@@ -32,11 +32,11 @@ class Inputs:
     height_m: float = FIGURE_HEIGHT
 
     def values(self) -> dict[str, object]:
-        """By name."""
+        """Inputs by name."""
         return {"figure": self.figure, "pieces": self.pieces, "height_m": self.height_m}
 
     def keys(self) -> dict[str, str]:
-        """Key of each."""
+        """Key of each input."""
         return {
             "figure": figure_digest(self.figure),
             "pieces": key_of(pieces=self.pieces),
@@ -48,7 +48,7 @@ class Inputs:
 class Results:
     """Results of stages: `results[lift]` is what the stage function `lift` returned, with its type.
 
-    keys : key of each result; none where there is no store
+    keys : key of each result; empty where there is no store
     """
 
     values: Mapping[str, object]
@@ -66,8 +66,8 @@ class Runner:
     """Runs stages in the order of `stages`.
 
     settings : each stage gets those that it reads
-    store : where results are looked for, and kept
-    observer : what notes time and memory
+    store : where results are looked up and kept
+    observer : records time and memory
     """
 
     settings: Settings
@@ -80,7 +80,7 @@ class Runner:
         return stage_keys(self.stages, self.settings, inputs.keys())
 
     def run(self, goals: Sequence[Callable[..., object]], inputs: Inputs) -> Results:
-        """Results of the stage functions `goals`, and of all that was needed on the way.
+        """Results of the stage functions `goals`, and of all stages that were needed for them.
 
         Stages whose results the store holds are not run, nor are those that only they need.
         """

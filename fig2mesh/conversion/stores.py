@@ -1,6 +1,6 @@
-"""Stores of what stages made: in memory, in the folder of `--save-stages`, or under keys of what it was made from.
+"""Stores of stage results: in memory, in the folder of `--save-stages`, or in files named by the keys of results.
 
-A store offers what it holds and keeps what it is given; the runner decides what is needed.
+A store only loads and saves; the runner decides what is needed.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ T = TypeVar("T")
 
 
 class Store(Protocol):
-    """Where results of stages are kept."""
+    """Storage of stage results."""
 
     def load(self, stage: Stage, key: str) -> object | None:
         """The result kept for a stage, or None."""
 
     def save(self, stage: Stage, key: str, value: object) -> None:
-        """Keep a result, if it is of a kind that this store keeps."""
+        """Store a result, if the store keeps results of this stage."""
 
 
 class NoStore:
-    """Keeps nothing."""
+    """Store that keeps nothing."""
 
     def load(self, stage: Stage, key: str) -> None:
         return None
@@ -43,7 +43,7 @@ class NoStore:
 
 @dataclass
 class MemoryStore:
-    """Keeps every result in memory; a change of settings or figure changes the keys of what depends on it."""
+    """Store in memory; a change of settings or figure changes the keys of all results that depend on it."""
 
     results: dict[str, object] = field(default_factory=dict)
 
@@ -56,23 +56,23 @@ class MemoryStore:
 
 @dataclass(frozen=True)
 class FolderStore:
-    """One file a stage, by its name: `--save-stages DIR`.
+    """One file per stage, named after it: `--save-stages DIR`.
 
-    read : names of the stages whose files are to be used; the others are made again, and written
+    read : names of the stages whose files are used; the others are run again, and written
     """
 
     folder: Path
     read: frozenset[str] = frozenset()
 
     def load(self, stage: Stage, key: str) -> object | None:
-        """Raises FigureError where a file that is to be used is missing or damaged."""
+        """The result in a stage's file, or None if it is to be run. Raises FigureError for missing or damaged files."""
         if stage.name not in self.read or stage.kept is Kept.NEVER:
             return None
         found: object = self.read_file(stage.name, stage.makes)
         return found
 
     def save(self, stage: Stage, key: str, value: object) -> None:
-        """Raises OutputError where the disk refuses."""
+        """Write the file of a stage. Raises OutputError if it cannot be written."""
         if stage.kept is not Kept.NEVER:
             self.write_file(stage.name, value)
 
@@ -95,12 +95,12 @@ class FolderStore:
 
 @dataclass
 class KeyedStore:
-    """Files named by the keys of results, which are therefore never outdated, only unused.
+    """Files named by the keys of results, so that they are never outdated, only unused.
 
     Any number of processes on any number of machines may share a folder: results of one key are equal, and appear
     whole or not at all.
 
-    fresh : nothing is read, all is kept; made, reused : names of results that were not there, and that were read
+    fresh : read nothing, store everything; made, reused : names of results that were made, and that were read
     """
 
     folder: Path
@@ -120,7 +120,7 @@ class KeyedStore:
             self._save(stage.name, key, value)
 
     def make(self, name: str, key: str, kind: Any, run: Callable[[], T]) -> T:
-        """A result that is not of a stage: read if it is there and sound, else made and kept; kind : its type."""
+        """A result that is not of a stage: read if an intact file exists, else made and stored; kind : its type."""
         found: T | None = self._load(name, key, kind)
         if found is None:
             found = run()
@@ -137,7 +137,7 @@ class KeyedStore:
         try:
             found = read_record(self._path(key), name, kind)
         except InputError as error:
-            log.debug("%s; it is made again", error)
+            log.debug("%s; making it again", error)
             with suppress(OSError):
                 self._path(key).unlink()
             return None
@@ -149,5 +149,5 @@ class KeyedStore:
             self._path(key).parent.mkdir(parents=True, exist_ok=True)
             write_record(self._path(key), name, value)
         except OSError as error:
-            # What is not kept is made again; a disk that is full will be reported by the outputs.
-            log.debug("%s: not kept (%s)", self._path(key), error.strerror)
+            # A result that is not stored is made again; the outputs will report a full disk.
+            log.debug("%s: not stored (%s)", self._path(key), error.strerror)

@@ -9,13 +9,13 @@ from fig2mesh.errors import OutputError
 
 
 def check_text(path: Path, overwrite: bool, option: str = "--report") -> None:
-    """Refuse a text file that could not be written; option : the one that names it. Raises OutputError."""
+    """Raise OutputError for a text file that could not be written; option : the one that names it."""
     if path.is_dir():
-        raise OutputError(path, "is a folder", f"give {option} a file name")
+        raise OutputError(path, "is a directory", f"give {option} a file name")
     if path.exists() and not overwrite:
-        raise OutputError(path, "exists", f"pass --overwrite or {_another(option)}")
+        raise OutputError(path, "already exists", "use --overwrite or choose another name")
     if not path.parent.is_dir():
-        raise OutputError(path, f"no folder {path.parent}", "create it first")
+        raise OutputError(path, f"no such directory {path.parent}", "create it first")
 
 
 def write_text(path: Path, text: str, option: str = "--report") -> None:
@@ -23,8 +23,4 @@ def write_text(path: Path, text: str, option: str = "--report") -> None:
     try:
         atomic_file.write_text(path, text)
     except OSError as error:
-        raise OutputError(path, error.strerror or "cannot be written", f"choose {_another(option)}") from None
-
-
-def _another(option: str) -> str:
-    return "another name" if option == "-o" else f"another {option}"
+        raise OutputError(path, error.strerror or "cannot be written", f"choose another name for {option}") from None

@@ -1,1 +1,1 @@
-"""Evaluation of the main job: whole folders of drawings converted, what comes out measured."""
+"""Evaluation: convert folders of drawings and measure the models."""

@@ -1,6 +1,6 @@
-"""`fig2mesh evaluate figures`: every drawing of a folder through the main job, and all measures of what came out.
+"""`fig2mesh evaluate figures`: convert every drawing of a folder and take all measures of the models.
 
-The models are made 1.79 m high, as the limits of the measures are meant, and not written.
+The models are 1.79 m high, the height for which the thresholds of the measures are defined, and are not written.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fig2mesh.conversion.convert import run_stages
 from fig2mesh.errors import InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.measure.bleed import bleed_share
-from fig2mesh.measure.front import flange_share, gap, look, wall_share
+from fig2mesh.measure.front import flange_share, front_view, gap, wall_share
 from fig2mesh.measure.model import front_similarity, silhouette_iou
 from fig2mesh.measure.solid import laws, quality, thinnest_wall
 from fig2mesh.mesh.simplify import deviation
@@ -32,9 +32,9 @@ from fig2mesh.stages.solid import solid
 
 LEVELS = 3
 COARSE = 5000
-"""Triangles of a further level, the same for every quality: what a map with hundreds of figures can afford."""
+"""Triangles of an additional level, the same for every quality, for maps with hundreds of figures."""
 
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 Facts = dict[str, float | int | bool]
 
 
@@ -48,13 +48,13 @@ class Drawing:
     mask: Path | None
 
     def arguments(self) -> dict[str, Any]:
-        """Of `read_figure`."""
+        """Arguments of `read_figure`."""
         return {"path": self.image, "mask": self.mask, "keypoints": self.keypoints, "name": self.name}
 
 
 @dataclass(frozen=True)
-class Row:
-    """What came of one drawing: facts by the keys of `COLUMNS`, or the one line that says why there are none."""
+class FigureRow:
+    """Result for one drawing: values by the keys of `COLUMNS`, or the reason of the failure in one line."""
 
     name: str
     facts: Facts
@@ -63,31 +63,31 @@ class Row:
 
 @dataclass(frozen=True)
 class Column:
-    """One measure in the table: its key, heading, factor and format, and which end is the worse one."""
+    """One measure in the table: its key, heading, factor and format, and which extreme is the worst."""
 
     key: str
     title: str
     form: str = ".2f"
     factor: float = 1.0
-    worse: Literal["least", "greatest"] = "greatest"
+    worse: Literal["min", "max"] = "max"
 
 
 COLUMNS = (
-    Column("silhouette_iou", "IoU %", ".1f", 100, "least"),
-    Column("front_psnr_db", "PSNR dB", ".1f", 1, "least"),
-    Column("front_ssim", "SSIM", ".3f", 1, "least"),
+    Column("silhouette_iou", "IoU %", ".1f", 100, "min"),
+    Column("front_psnr_db", "PSNR dB", ".1f", 1, "min"),
+    Column("front_ssim", "SSIM", ".3f", 1, "min"),
     Column("bleed_share", "bleed %", ".2f", 100),
     Column("gap_share", "gap %", ".2f", 100),
     Column("gap_radius_mm", "gap mm", ".1f"),
     Column("flange_share", "flange %", ".2f", 100),
     Column("wall_share", "wall %", ".1f", 100),
-    Column("thinnest_mm", "thinnest mm", ".2f", 1, "least"),
-    Column("thinnest_quantile_mm", "thinnest 0.1 % mm", ".1f", 1, "least"),
-    Column("quality_least", "q least", ".3f", 1, "least"),
-    Column("quality_quantile", "q 1 %", ".2f", 1, "least"),
+    Column("thinnest_mm", "thinnest mm", ".2f", 1, "min"),
+    Column("thinnest_quantile_mm", "thinnest 0.1 % mm", ".1f", 1, "min"),
+    Column("quality_least", "q least", ".3f", 1, "min"),
+    Column("quality_quantile", "q 1 %", ".2f", 1, "min"),
     Column("slivers", "q < 0.05 %", ".3f", 100),
-    Column("closed", "closed", "yes", 1, "least"),
-    Column("manifold", "manifold", "yes", 1, "least"),
+    Column("closed", "closed", "yes", 1, "min"),
+    Column("manifold", "manifold", "yes", 1, "min"),
     Column("components", "pieces", "d"),
     Column("pieces_drawn", "drawn", "d"),
     Column("genus", "genus", "d"),
@@ -105,7 +105,7 @@ COLUMNS = (
 def find_drawings(folder: Path) -> tuple[Drawing, ...]:
     """Figures of a folder by name: folders with image.png, and pairs of NAME.png and NAME.json (NAME_mask.png)."""
     if not folder.is_dir():
-        raise InputError(folder, "no such folder", "name a folder of figures")
+        raise InputError(folder, "no such directory", "name a folder of figures")
     found = []
     for path in sorted(folder.iterdir()):
         if path.is_dir() and (path / "image.png").exists():
@@ -120,27 +120,29 @@ def find_drawings(folder: Path) -> tuple[Drawing, ...]:
 
 
 def drawing_in(folder: Path) -> Drawing:
-    """The figure that a folder of image.png, keypoints.json and, where needed, mask.png is."""
+    """Drawing in a folder with image.png, keypoints.json and, where needed, mask.png."""
     mask = folder / "mask.png"
     return Drawing(folder.name, folder / "image.png", folder / "keypoints.json", mask if mask.exists() else None)
 
 
-def evaluate_figures(drawings: tuple[Drawing, ...], settings: Settings, say: Say = lambda line: None) -> list[Row]:
-    """Make and measure a model of each drawing; what fails is told in its row and the others go on."""
+def evaluate_figures(
+    drawings: tuple[Drawing, ...], settings: Settings, log: Log = lambda line: None
+) -> list[FigureRow]:
+    """Make and measure a model of each drawing; a failure is reported in its row and does not stop the others."""
     rows = []
     for number, drawing in enumerate(drawings, 1):
-        say(f"{number} of {len(drawings)}: {drawing.name}")
+        log(f"{number} of {len(drawings)}: {drawing.name}")
         try:
-            rows.append(Row(drawing.name, measure_drawing(drawing, settings)))
+            rows.append(FigureRow(drawing.name, measure_drawing(drawing, settings)))
         except InputError as error:
-            rows.append(Row(drawing.name, {}, " ".join(str(error).split())))
-        except Exception as error:  # Whatever breaks one figure is a finding about that figure.
-            rows.append(Row(drawing.name, {}, f"{type(error).__name__}: {' '.join(str(error).split())}"))
+            rows.append(FigureRow(drawing.name, {}, " ".join(str(error).split())))
+        except Exception as error:  # Any error of one figure is a result for that figure.
+            rows.append(FigureRow(drawing.name, {}, f"{type(error).__name__}: {' '.join(str(error).split())}"))
     return rows
 
 
 def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
-    """All measures of one drawing's model, by the keys of `COLUMNS`."""
+    """Measures of one drawing's model, by the keys of `COLUMNS`."""
     figure = read_figure(**drawing.arguments())
     settings = replace(settings, lods=LEVELS)
     done = run_stages(figure, settings, (lift, solid, simplify, model), height_m=FIGURE_HEIGHT)
@@ -153,7 +155,7 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     pixel, origin_px = on_drawing(frame, asset)
     similar = front_similarity(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
     missing = gap(finest, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    front, wall, shape, law = look(finest), thinnest_wall(finest), quality(finest), laws(finest)
+    front, wall, shape, law = front_view(finest), thinnest_wall(finest), quality(finest), laws(finest)
     # FIGURE units are metres at this height.
     deviations = [level.deviation_m for level in levels] + [deviation(simplify_mesh(mesh, COARSE), mesh)]
     names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
@@ -166,9 +168,9 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
         "gap_radius_mm": missing.radius_mm,
         "flange_share": flange_share(front),
         "wall_share": wall_share(front),
-        "thinnest_mm": wall.least_mm,
+        "thinnest_mm": wall.min_mm,
         "thinnest_quantile_mm": wall.quantile_mm,
-        "quality_least": shape.least,
+        "quality_least": shape.minimum,
         "quality_quantile": shape.quantile,
         "slivers": shape.slivers,
         "closed": law.closed,
@@ -184,8 +186,8 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     }
 
 
-def summary(rows: list[Row]) -> tuple[Facts, Facts]:
-    """Median and worst of each measure over the figures that have one; for counts and laws too."""
+def summary(rows: list[FigureRow]) -> tuple[Facts, Facts]:
+    """Median and worst value of each measure over the figures with a model."""
     median: Facts = {}
     worst: Facts = {}
     for column in COLUMNS:
@@ -194,12 +196,12 @@ def summary(rows: list[Row]) -> tuple[Facts, Facts]:
             median[column.key] = (
                 statistics.median_low(values) if column.form in ("d", "yes") else statistics.median(values)
             )
-            worst[column.key] = min(values) if column.worse == "least" else max(values)
+            worst[column.key] = min(values) if column.worse == "min" else max(values)
     return median, worst
 
 
-def as_markdown(rows: list[Row]) -> str:
-    """A table with a line for each figure, then median and worst; figures without a model have their reason."""
+def as_markdown(rows: list[FigureRow]) -> str:
+    """Markdown table with a row for each figure, or the reason of its failure, then median and worst."""
     lines = [
         "| figure | " + " | ".join(column.title for column in COLUMNS) + " |",
         "|---|" + "---:|" * len(COLUMNS),
@@ -215,8 +217,8 @@ def as_markdown(rows: list[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def as_json(rows: list[Row]) -> str:
-    """The same facts unrounded: lengths in mm, shares as fractions."""
+def as_json(rows: list[FigureRow]) -> str:
+    """JSON of the same values, unrounded: lengths in mm, shares as fractions."""
     median, worst = summary(rows)
     figures: dict[str, Any] = {row.name: row.facts or {"failure": row.failure} for row in rows}
     return json.dumps({"figures": figures, "median": median, "worst": worst}, indent=2, allow_nan=False) + "\n"

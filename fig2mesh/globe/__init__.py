@@ -1,1 +1,1 @@
-"""Models on a globe in the browser: files that CesiumJS reads, whoever wrote them."""
+"""Models on a globe in the browser, from any files that CesiumJS reads."""

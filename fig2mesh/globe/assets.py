@@ -1,4 +1,4 @@
-"""Files that a globe shows: what they are, which others they need, and what is known before a client opens them.
+"""Files shown on a globe: their kinds, dependencies and metadata.
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html (tileset.json)
 https://github.com/AnalyticalGraphicsInc/czml-writer/wiki/CZML-Guide
@@ -34,12 +34,12 @@ SUFFIXES: dict[str, Kind] = {
 
 @dataclass(frozen=True)
 class GlobeAsset:
-    """A file to be shown and those that it needs.
+    """A file to be shown, and its dependencies.
 
-    kind : what CesiumJS opens it as
-    main : the file itself, relative to `folder`, as in an address
-    folder : what addresses within the files are relative to
-    needs : further files, likewise relative
+    kind : type of data source in CesiumJS
+    main : the file itself, relative to `folder`, as in a URL
+    folder : base of the URLs in the files
+    needs : other files, relative to `folder`
     facts : JSON-serialisable: name, credit, metadata, and for models the place and number of triangles
     """
 
@@ -56,25 +56,26 @@ class GlobeAsset:
 
 
 def find_assets(paths: tuple[Path, ...]) -> tuple[GlobeAsset, ...]:
-    """The assets of files and folders.
+    """Find the assets in files and folders.
 
     paths : .glb, .gltf, tileset.json, .czml or .geojson; or folders: their tileset.json, or else all models, CZML and
         GeoJSON files in them
-    Raises InputError for what is not there, of another kind, damaged or without a place on the earth.
+
+    Raises InputError for files that are missing, of another kind, damaged or without a place on the earth.
     """
     return tuple(_read(path) for given in paths for path in _in_folder(given))
 
 
 def _in_folder(path: Path) -> list[Path]:
     if not path.exists():
-        raise InputError(path, "is not there", "check the name")
+        raise InputError(path, "no such file", "check the path")
     if not path.is_dir():
         return [path]
     if (path / "tileset.json").is_file():
         return [path / "tileset.json"]
     found = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES and p.suffix.lower() != ".json")
     if not found:
-        raise InputError(path, "holds no tileset.json and no models", "give a folder of 3D Tiles, or a file")
+        raise InputError(path, "contains no tileset.json and no models", "give a folder of 3D Tiles, or a file")
     return found
 
 
@@ -82,10 +83,10 @@ def _read(path: Path) -> GlobeAsset:
     kind = SUFFIXES.get(path.suffix.lower())
     if kind is None:
         remedy = "give .glb, .gltf, tileset.json, .czml or .geojson"
-        raise InputError(path, f"a globe shows no {path.suffix or 'file without a suffix'}", remedy)
+        raise InputError(path, f"unknown suffix {path.suffix}" if path.suffix else "no suffix", remedy)
     try:
         found = {"model": _model, "tileset": _tileset, "czml": _czml, "geojson": _geojson}[kind](path)
-        with decoding("what no page can hold", ValueError, RecursionError):
+        with decoding("metadata that is not valid JSON", ValueError, RecursionError):
             json.dumps(found.facts, allow_nan=False)
         return found
     except DamagedFile as error:
@@ -96,14 +97,14 @@ def _model(path: Path) -> GlobeAsset:
     gltf = read_gltf(path)
     record = gltf.extras.get("georeference")
     if record is None:
-        raise InputError(path, "has no place on the earth", "write it with --lonlat, or show it as 3D Tiles or CZML")
+        raise InputError(path, "has no place on the earth", "write it with --lonlat, or give 3D Tiles or CZML")
     place = placement_of_record(record)
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
     facts = {
         "name": path.stem,
         "credit": gltf.document.get("asset", {}).get("copyright", ""),
         "metadata": gltf.extras.get("metadata", {}),
-        # CesiumJS turns models so that they face east at heading 0.
+        # CesiumJS rotates models so that they face east at heading 0.
         "place": record | {"entity_heading_deg": cesium_entity_heading_deg(place)},
         "triangles": sum(_triangles(gltf, mesh) for mesh, _ in gltf.instances()),
     }
@@ -122,10 +123,10 @@ def _triangles(gltf: Gltf, mesh: int) -> int:
 def _tileset(path: Path) -> GlobeAsset:
     document = _json(path)
     if not isinstance(document, dict) or "root" not in document or "asset" not in document:
-        raise InputError(path, "is no tileset", "give a tileset.json of 3D Tiles, or .geojson, .czml, .glb")
+        raise InputError(path, "not a tileset", "give a tileset.json of 3D Tiles, or .geojson, .czml, .glb")
     check_shape(document, {"asset": dict, "metadata": {"properties": dict}})
     needs, pending, folder = [], [(path, "")], path.parent
-    seen = {path.resolve()}
+    visited = {path.resolve()}
     while pending:
         file, prefix = pending.pop()
         for uri in _contents(file):
@@ -133,11 +134,11 @@ def _tileset(path: Path) -> GlobeAsset:
             relative = prefix + unquote(parts.path)
             target = folder / relative
             if parts.scheme or parts.netloc:
-                raise InputError(file, f"its content {uri[:80]} is elsewhere", "give a tileset whose files are here")
+                raise InputError(file, f"its content {uri[:80]} is not a local file", "give a tileset with local files")
             _check_there(target, file)
-            if target.resolve() in seen:
+            if target.resolve() in visited:
                 continue
-            seen.add(target.resolve())
+            visited.add(target.resolve())
             needs.append(relative)
             if target.suffix.lower() == ".json":
                 pending.append((target, relative[: len(relative) - len(target.name)]))
@@ -162,7 +163,7 @@ def _contents(path: Path) -> Iterator[str]:
     while pending:
         tile = pending.pop()
         if "implicitTiling" in tile:
-            raise InputError(path, "its tiles are implicit", "give a tileset that lists its tiles")
+            raise InputError(path, "implicit tiling is not supported", "give a tileset with explicit tiles")
         for content in [tile["content"]] if "content" in tile else tile.get("contents", []):
             check_shape(content, {"url" if "uri" not in content else "uri": Required(str)}, "content")
             yield content["uri"] if "uri" in content else content["url"]  # url: 3D Tiles 0.0
@@ -173,7 +174,7 @@ def _czml(path: Path) -> GlobeAsset:
     packets = _json(path)
     check_shape(packets, [{"model": dict}])
     if not packets or packets[0].get("id") != "document":
-        raise InputError(path, "is no CZML", "its first packet must have the id document")
+        raise InputError(path, "not a CZML file", "give CZML whose first packet has the id document")
     uris = []
     for packet in packets[1:]:
         model = packet.get("model", {}).get("gltf")
@@ -187,7 +188,7 @@ def _czml(path: Path) -> GlobeAsset:
 def _geojson(path: Path) -> GlobeAsset:
     document = _json(path)
     if not isinstance(document, dict) or document.get("type") not in ("Feature", "FeatureCollection"):
-        raise InputError(path, "is no GeoJSON of features", "give a Feature or FeatureCollection")
+        raise InputError(path, "not a GeoJSON file of features", "give a Feature or FeatureCollection")
     return GlobeAsset("geojson", path.name, path.parent, (), {"name": path.stem, "credit": "", "metadata": {}})
 
 
@@ -196,14 +197,14 @@ def _json(path: Path) -> Any:
 
 
 def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
-    """Files beside `path`, from addresses in it. Those with their data in them need none."""
+    """Files referenced by URLs in `path`, relative to it; data URLs need none."""
     found = []
     for uri in uris:
         parts = _split(uri)
         if parts.scheme == "data":
             continue
         if parts.scheme or parts.netloc:
-            raise InputError(path, f"needs {uri[:80]}, which is elsewhere", "put the file beside it")
+            raise InputError(path, f"needs {uri[:80]}, which is not a local file", "put the file next to it")
         relative = unquote(parts.path)
         _check_there(path.parent / relative, path)
         found.append(relative)
@@ -211,10 +212,10 @@ def _needed(path: Path, uris: list[str]) -> tuple[str, ...]:
 
 
 def _split(uri: str) -> SplitResult:
-    with decoding("no address", ValueError):
+    with decoding("invalid URL", ValueError):
         return urlsplit(uri)
 
 
 def _check_there(target: Path, by: Path) -> None:
     if not is_plain_file(target):
-        raise InputError(by, f"needs {target.name}, which is not there", "write it again, whole")
+        raise InputError(by, f"needs the missing file {target.name}", "write it again, with all its files")

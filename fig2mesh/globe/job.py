@@ -19,13 +19,13 @@ log = logging.getLogger("fig2mesh")
 
 PAGE = "index.html"
 MARK = '<meta name="generator" content="fig2mesh globe">'
-"""By this a folder is known to be one of ours, and may be replaced."""
+"""Mark of a folder written by `fig2mesh globe`, which may be replaced."""
 
 
 def run(
     request: GlobeRequest, assets: Sequence[Path], overlays: Sequence[tuple[str, float, float, float, float]] = ()
 ) -> None:
-    """Do what `fig2mesh globe` asks for.
+    """Run `fig2mesh globe`.
 
     assets : files and folders of models; overlays : pictures, each with its west, south, east and north edge, degrees
     """
@@ -59,11 +59,11 @@ def _check_folder(folder: Path, overwrite: bool) -> None:
     if not folder.exists():
         return
     if not folder.is_dir():
-        raise OutputError(folder, "is a file", "give -o a folder")
+        raise OutputError(folder, "not a directory", "give -o a folder")
     if not any(folder.iterdir()):
         return
     page = folder / PAGE
     if not page.is_file() or MARK not in page.read_text(encoding="utf-8", errors="replace")[:2000]:
-        raise OutputError(folder, "holds other files", "give -o an empty or a new folder")
+        raise OutputError(folder, "contains other files", "give -o an empty or new folder")
     if not overwrite:
-        raise OutputError(folder, "exists already", "use --overwrite or choose another name")
+        raise OutputError(folder, "already exists", "use --overwrite or choose another name")

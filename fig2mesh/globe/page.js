@@ -62,7 +62,7 @@ async function start() {
     }));
     find('filter').hidden = figures.length <= 12;
     find('more').hidden = matching.length <= MOST_LISTED;
-    find('more').textContent = `and ${matching.length - MOST_LISTED} more: find them by name`;
+    find('more').textContent = `and ${matching.length - MOST_LISTED} more; search by name`;
   }
 
   function unlock() {
@@ -168,7 +168,7 @@ async function start() {
       ...row('source', plain(source)), ...row('credit', figure.credit),
       ...(place ? [
         ...row('place', `${angle(place.lat_deg, 'N', 'S')}, ${angle(place.lon_deg, 'E', 'W')}`),
-        ...row('ground', `${place.height_m.toFixed(2)} m`), ...row('nose to', `${place.heading_deg.toFixed(2)}°`),
+        ...row('ground', `${place.height_m.toFixed(2)} m`), ...row('facing', `${place.heading_deg.toFixed(2)}°`),
       ] : []),
       ...row('height', figure.size >= 1000 ? `${(figure.size / 1000).toFixed(2)} km` : `${figure.size.toFixed(2)} m`),
       ...Object.entries(rest).filter(([key]) => !SHOWN.test(key)).slice(0, 12).flatMap(([key, value]) => row(key, String(plain(value)).slice(0, 120))),
@@ -221,7 +221,7 @@ async function start() {
   function paintFigure(figure) {
     const grain = paint(figure, state.mode, figure === state.current ? state.part : null);
     if (figure !== state.current) return;
-    find('grain').textContent = { texel: 'for each point of the surface', part: 'by the share of each part', none: 'the file does not say' }[grain];
+    find('grain').textContent = { texel: 'per point of the surface', part: 'by the share of each part', none: 'not in the file' }[grain];
     scene.requestRender();
   }
 
@@ -246,7 +246,7 @@ async function start() {
     const feature = name === null ? undefined : figure.features().find((each) => each.getProperty('name') === name);
     const share = feature?.getProperty('observedShare');
     find('part').hidden = name === null;
-    find('part').textContent = name === null ? '' : `part: ${name}${share === undefined ? '' : `, the drawing showed ${Math.round(100 * share)} % of it`}`;
+    find('part').textContent = name === null ? '' : `part: ${name}${share === undefined ? '' : `, ${Math.round(100 * share)} % observed in the drawing`}`;
     for (const button of find('parts').querySelectorAll('button')) button.setAttribute('aria-pressed', String(button.textContent === name));
     if (figure) paintFigure(figure);
   }

@@ -1,4 +1,4 @@
-"""The page of a globe with models on it: one HTML text, CesiumJS and the files beside it."""
+"""HTML page of a globe with models; CesiumJS and the files are separate."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; worker-src 'self' blob:; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self' data: blob:; font-src 'self'"
 )
-"""Browsers keep the page to it: nothing is fetched from elsewhere, whatever the files name.
+"""Content security policy: the page fetches nothing from other sites, whatever the files refer to.
 
-CesiumJS needs 'unsafe-eval' for what it brings along as WebAssembly and for styles.
+CesiumJS needs 'unsafe-eval' for its WebAssembly and for styles.
 """
 
 
 @dataclass(frozen=True)
 class Overlay:
-    """A picture that lies on the ground, north up.
+    """A picture draped over the ground, north up.
 
     image : its file
-    west, south, east, north : degrees; of the outer edges of the picture, not of pixel centres
+    west, south, east, north : outer edges of the picture, degrees (not pixel centres)
     """
 
     image: Path
@@ -43,18 +43,18 @@ class Overlay:
     north: float
 
     def __post_init__(self) -> None:
-        lon_fine = all(-180 <= lon <= 180 for lon in (self.west, self.east)) and self.west < self.east
-        if not lon_fine or not -90 <= self.south < self.north <= 90:
-            finding = f"no rectangle W S E N: {self.west:g} {self.south:g} {self.east:g} {self.north:g}"
+        lon_ok = all(-180 <= lon <= 180 for lon in (self.west, self.east)) and self.west < self.east
+        if not lon_ok or not -90 <= self.south < self.north <= 90:
+            finding = f"{self.west:g} {self.south:g} {self.east:g} {self.north:g} is not a rectangle W S E N"
             raise InputError("--overlay", finding, "give degrees, west before east and south before north")
         if not self.image.is_file():
-            raise InputError("--overlay", f"{self.image} is not there", "check the name")
+            raise InputError("--overlay", f"no such file {self.image}", "check the path")
         if self.image.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp"):
-            raise InputError("--overlay", f"browsers show no {self.image.suffix or 'such file'}", "give PNG or JPEG")
+            raise InputError("--overlay", f"{self.image} is not a PNG, JPEG or WebP file", "convert it to PNG or JPEG")
 
 
 def globe_page(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = ()) -> str:
-    """The page; it finds CesiumJS at cesium/ and the files at the addresses of `page_files`."""
+    """HTML page; it loads CesiumJS from cesium/ and the files from the URLs of `page_files`."""
     facts: dict[str, Any] = {
         "assets": [
             {"kind": each.kind, "url": quote(_address(index, each.main)), **each.facts}
@@ -72,7 +72,7 @@ def globe_page(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = (
         "title": html.escape(title),
         "policy": html.escape(POLICY),
         "cesium": f"{CESIUM}/",
-        # "</" would end the script element, and "<!--" change how its end is looked for.
+        # "</" would end the script element, and "<!--" would change the parsing of its end.
         "facts": json.dumps(facts, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
         "offline": asset("offline_viewer.js"),
         "style": asset("page.css", PACKAGE),
@@ -82,7 +82,7 @@ def globe_page(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = (
 
 
 def page_files(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = ()) -> dict[str, Path]:
-    """Address → file, for all that the page loads except CesiumJS."""
+    """URL → file, for everything that the page loads except CesiumJS."""
     found = {_address(index, name): each.folder / name for index, each in enumerate(assets) for name in each.files}
     return found | {_overlay(index, each): each.image for index, each in enumerate(overlays)}
 

@@ -9,24 +9,24 @@ from fig2mesh.conversion.fields import check_fields, option, request_class
 
 @request_class
 class GlobeRequest:
-    """How models are shown on a globe."""
+    """Options for showing models on a globe."""
 
     output: Path | None = option(
         default=None,
         short="o",
         metavar="DIR",
-        help="Write page, files and CesiumJS into DIR, which any web server can serve, instead of showing them.",
+        help="Write the page, its files and CesiumJS to DIR, for any web server, instead of showing it.",
     )
     cesium: Path | None = option(
         default=None,
         metavar="DIR",
-        help="The npm package cesium; default: node_modules/cesium in this folder or one above.",
+        help="Folder of the npm package cesium. Default: node_modules/cesium in the current folder or a parent.",
     )
     port: int = option(
-        default=0, low=0, high=65535, metavar="N", default_text="a free one", help="Of the page's server."
+        default=0, low=0, high=65535, metavar="N", default_text="a free one", help="Port of the local web server."
     )
     open: bool = option(default=True, help="Open the page in a browser.")
-    overwrite: bool = option(default=False, help="Replace the page in DIR.")
+    overwrite: bool = option(default=False, help="Replace an existing page in DIR.")
 
     def __post_init__(self) -> None:
         check_fields(self)

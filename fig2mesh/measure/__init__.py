@@ -1,1 +1,1 @@
-"""Measures of results: how good a model or its front view is."""
+"""Measures of quality of models and of their front views."""

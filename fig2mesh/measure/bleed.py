@@ -1,4 +1,4 @@
-"""Whether the drawing's background has come onto the model: colours at the rim of its front silhouette."""
+"""Bleeding of the drawing's background onto the model: colours at the rim of its front silhouette."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from exporters.asset import ByteArray, TexturedMesh
 from fig2mesh.measure.model import MAX_SIDE_PX, BoolArray, box_of, coarse_point, every_step, front_pixels
 
 RIM_PX = 2.0
-"""Pixels of the model this near to its silhouette are looked at."""
+"""Width of the rim of the model that is examined."""
 
 BEYOND_PX = 3
-"""Background and figure are what is this far outside and inside of the drawn contour: between them they mix."""
+"""Pixels this far outside and inside of the drawn contour are background and figure; those between are mixed."""
 
 OPAQUE = 64
-"""Alpha from which the colour of a pixel of a cut-out figure, which has nothing of the background, is known."""
+"""Alpha threshold for pixels of a cut-out figure whose colour is free of background."""
 
 NEAR_PX = 8
-"""Colours of the figure are looked for within this many pixels: contours are thin, and fills begin beside them."""
+"""Search radius for colours of the figure: contours are thin, and fills begin next to them."""
 
 APART = 60.0
-"""Where background and figure differ by less (RGB 0-255) nothing can be told."""
+"""Minimum difference (RGB 0-255) by which background and figure can be distinguished."""
 
 
 def bleed_share(
@@ -35,7 +35,7 @@ def bleed_share(
 ) -> float:
     """Share of pixels at the rim of the model's front that are nearer to the background's colour than to the figure's.
 
-    Of all rim pixels; those where the two are alike count as clean. Arguments as in `measure.front_similarity`.
+    Pixels where the two cannot be distinguished count as clean. Arguments as in `measure.front_similarity`.
     """
     if not mask.any():
         return 0.0
@@ -44,7 +44,7 @@ def bleed_share(
     border = (BEYOND_PX + 2) * step
     edges = x0 - border, y0 - border, x1 + border, y1 + border
     inside, picture = every_step(mask, edges, step), every_step(rgba, edges, step)[..., :3].astype(np.float32)
-    # Beyond the picture's own edge there is no background to be known.
+    # Beyond the edge of the picture the background is unknown.
     known = every_step(np.ones(rgba.shape[:2], bool), edges, step)
     size = inside.shape[1], inside.shape[0]
     front = front_pixels(mesh, size, step * metres_per_pixel, coarse_point(origin_px, edges[:2], step), 1, "textured")
@@ -55,15 +55,15 @@ def bleed_share(
         return 0.0
     alpha = every_step(rgba, edges, step)[..., 3]
     if alpha[outer].mean() < 128:
-        # A cut-out knows its own rim: what is opaque is figure.
+        # In a cut-out whatever is opaque is figure.
         inner = inside & (alpha >= OPAQUE)
     else:
         inner = ndimage.distance_transform_edt(inside) > BEYOND_PX
     inner = inner if inner.any() else inside
     colour = front[rim][:, :3].astype(np.float32)
     ground = picture[_nearest(outer, rim)]
-    own = _least_distance(colour, picture, inner, rim)
-    apart = _least_distance(ground, picture, inner, rim) > APART
+    own = _min_distance(colour, picture, inner, rim)
+    apart = _min_distance(ground, picture, inner, rim) > APART
     return float(((np.linalg.norm(colour - ground, axis=1) < own) & apart).mean())
 
 
@@ -73,10 +73,10 @@ def _nearest(there: NDArray[np.bool_], at: NDArray[np.bool_]) -> tuple[NDArray[n
     return nearest[0][at], nearest[1][at]
 
 
-def _least_distance(
+def _min_distance(
     colour: NDArray[np.float32], picture: NDArray[np.float32], there: NDArray[np.bool_], at: NDArray[np.bool_]
 ) -> NDArray[np.float32]:
-    """(N,) distance from colours (N, 3) at pixels `at` to the nearest colour of `there` round about."""
+    """(N,) distance from colours (N, 3) at pixels `at` to the nearest colour of `there` in their neighbourhood."""
     rows, columns = np.nonzero(at)
     best = np.linalg.norm(colour - picture[_nearest(there, at)], axis=1)
     for down in range(-NEAR_PX, NEAR_PX + 1, 2):

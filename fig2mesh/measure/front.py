@@ -1,7 +1,8 @@
-"""What is wrong with a finished model seen along the drawing's line of sight: cracks, flanges, cookie-cutter edges.
+"""Defects of a model along the drawing's line of sight: cracks, flanges, cookie-cutter edges.
 
-All measures take closed surfaces in ASSET, metres, of a figure 1.79 m high, so that their limits in millimetres mean
-the same for every figure. Thickness is what the solid covers of a line of sight (along z), all layers together.
+All measures take closed surfaces in ASSET, metres, of a figure 1.79 m high, so that their thresholds in millimetres
+mean the same for every figure. Thickness is the length of a line of sight (along z) inside the solid, all layers
+together.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from fig2mesh.records import BoolArray, Mesh
 Surface = Mesh | TexturedMesh
 
 PITCH = 0.0015
-"""Metres between the lines of sight of `look`: two of them fit between a rim and the probe of `wall_share`."""
-MOST_STEPS = 2000
-"""Lines of sight along the longer side; wider models are looked at more coarsely."""
+"""Metres between the lines of sight of `front_view`: two of them fit between a rim and the probe of `wall_share`."""
+MAX_STEPS = 2000
+"""Lines of sight along the longer side; larger models are sampled more coarsely."""
 MAX_SIDE_PX = 1536
-"""Of longer drawings only every second, third ... pixel is measured, as for the overlap of the silhouettes."""
+"""Of larger drawings only every second, third ... pixel is measured, as for the overlap of the silhouettes."""
 LINES_AT_ONCE = 1 << 19
 
 FLANGE_RATIO, FLANGE_DEPTH = 0.5, 0.004
@@ -34,7 +35,7 @@ class Gap:
     """Parts of the drawing that the model does not cover.
 
     share : of the drawn silhouette's pixels
-    radius_mm : of the largest disc that fits into what is not covered
+    radius_mm : of the largest disc that fits into the uncovered region
     """
 
     share: float
@@ -43,9 +44,9 @@ class Gap:
 
 @dataclass(frozen=True)
 class FrontView:
-    """A solid looked at from the front.
+    """A solid viewed from the front.
 
-    thickness : (H, W) float64, metres, row 0 at the top; zero beside the solid and in the outermost pixels
+    thickness : (H, W) float64, metres, row 0 at the top; zero outside the solid and in the outermost pixels
     depth : (H, W) float64, metres from a pixel's centre to the silhouette's rim; zero outside
     pitch : metres between neighbouring pixels
     """
@@ -56,11 +57,11 @@ class FrontView:
 
 
 def gap(mesh: Surface, mask: BoolArray, *, metres_per_pixel: float, origin_px: tuple[float, float]) -> Gap:
-    """How much of the drawing has no model behind it, and how large the largest such place is.
+    """Parts of the drawing that no model lies behind: their share and their largest disc.
 
-    The overlap of the silhouettes hides what this tells: 1 % of the figure missing is a missing hand, a crack all
-    round a limb, or half a pixel along the whole rim. The largest disc tells them apart: a crack between parts is
-    long but narrow, a rim half a pixel wide, and a missing hand holds a disc of centimetres.
+    The overlap of the silhouettes hides this: 1 % of the figure missing is a missing hand, a crack all round a limb,
+    or half a pixel along the whole rim. The largest disc distinguishes them: a crack between parts is long but narrow,
+    a rim is half a pixel wide, and a missing hand contains a disc of centimetres.
 
     mesh : ASSET; mask : (H, W) bool, IMAGE; origin_px : the ASSET origin on the drawing
     """
@@ -77,17 +78,17 @@ def gap(mesh: Surface, mask: BoolArray, *, metres_per_pixel: float, origin_px: t
     missing[rows + 1, columns + 1] = ~_covered(mesh, points)
     if not missing.any():
         return Gap(0.0, 0.0)
-    # From the middle of a pixel to the rim of the missing part: half a pixel less than to the next covered middle.
+    # From the centre of a pixel to the rim of the missing part: half a pixel less than to the next covered centre.
     radius_px = (float(distance_transform_edt(missing).max()) - 0.5) * step
     return Gap(float(missing.sum()) / max(len(rows), 1), 1000 * radius_px * metres_per_pixel)
 
 
-def look(mesh: Surface) -> FrontView:
+def front_view(mesh: Surface) -> FrontView:
     """Thickness of a closed surface, ASSET, on a raster of lines of sight 1.5 mm apart."""
     from scipy.ndimage import distance_transform_edt
 
     (left, bottom), (right, top) = mesh.vertices[:, :2].min(axis=0).tolist(), mesh.vertices[:, :2].max(axis=0).tolist()
-    pitch = max(PITCH, max(right - left, top - bottom) / MOST_STEPS)
+    pitch = max(PITCH, max(right - left, top - bottom) / MAX_STEPS)
     width, height = (int(np.ceil(length / pitch)) + 2 for length in (right - left, top - bottom))
     x = left + (np.arange(width) - 0.5) * pitch
     y = top - (np.arange(height) - 0.5) * pitch
@@ -102,7 +103,7 @@ def flange_share(front: FrontView) -> float:
 
     With d the distance to the rim, a pixel is flange where d > 4 mm and the thickness is below d/2. A strip of
     circular section and half width r has thickness 2 sqrt(d (2r - d)) >= 2d up to its middle, a strip of elliptic
-    section k times as deep as wide k times that: flanges are what is flatter than a quarter of round. Closer to the
+    section k times as deep as wide k times that: flanges are flatter than a quarter of that. Closer to the
     rim than 4 mm everything is thin, and the raster too coarse. Drawn sheets (fans, flags, hat brims) count as well.
     """
     inside = front.thickness > 0
@@ -131,7 +132,7 @@ def wall_share(front: FrontView) -> float:
     def at(values: NDArray[np.float64], steps: float) -> NDArray[np.float64]:
         return np.asarray(map_coordinates(values, (rim + steps * inward).T, order=1, mode="constant"))
 
-    # The middle of a pixel of the rim lies half a pixel inside.
+    # The centre of a pixel of the rim lies half a pixel inside.
     edge = at(front.thickness, WALL_PROBE / pitch - 0.5)
     half_width, largest = np.zeros(len(rim)), np.zeros(len(rim))
     going = np.ones(len(rim), np.bool_)
@@ -149,7 +150,7 @@ def thickness_at(mesh: Surface, points: NDArray[np.float64]) -> NDArray[np.float
     scene, top = scene_of(mesh), _before(mesh)
     thickness = np.zeros(len(points))
     waiting = np.arange(len(points))
-    # A line of sight through an edge can meet both its triangles or none: such lines are moved a little.
+    # A line of sight through an edge can hit both its triangles or none: such lines are moved a little.
     for shift in (0.0, 2.3e-6, -3.1e-6, 7.7e-6):
         doubtful = []
         for part in np.array_split(waiting, -(-len(waiting) // LINES_AT_ONCE)) if len(waiting) else ():
@@ -164,7 +165,7 @@ def thickness_at(mesh: Surface, points: NDArray[np.float64]) -> NDArray[np.float
 def _crossed(
     scene: Any, mesh: Surface, points: NDArray[np.float64], top: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(N,) thickness along lines of sight, and how many more ways out than in each meets."""
+    """(N,) thickness along lines of sight, and number of exits minus number of entries of each."""
     import open3d as o3d
 
     answer = scene.list_intersections(o3d.core.Tensor.from_numpy(_lines(points, top)))
@@ -180,7 +181,7 @@ def _crossed(
 
 
 def _covered(mesh: Surface, points: NDArray[np.float64]) -> BoolArray:
-    """(N,) bool, whether there is surface behind points (N, 2) of the front view."""
+    """(N,) bool, whether the surface lies behind points (N, 2) of the front view."""
     import open3d as o3d
 
     lines = o3d.core.Tensor.from_numpy(_lines(points, _before(mesh)))
@@ -194,12 +195,12 @@ def _lines(points: NDArray[np.float64], top: float) -> NDArray[np.float32]:
 
 
 def _before(mesh: Surface) -> float:
-    """A z in front of all of a surface."""
+    """Some z in front of the whole surface."""
     return float(mesh.vertices[:, 2].max()) + 0.1
 
 
 def scene_of(mesh: Surface) -> Any:
-    """A surface for casting rays."""
+    """Open3D scene of a surface, for ray casting."""
     import open3d as o3d
 
     scene = o3d.t.geometry.RaycastingScene()

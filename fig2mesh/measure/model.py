@@ -1,9 +1,9 @@
-"""How good a finished model is: against its drawing, seen from the front, and as a solid.
+"""Measures of a finished model: likeness of its front to the drawing, and shape as a solid.
 
 Everything is measured on the triangles and texture that were exported; `load_textured` reads them back from the file.
 
-The drawing and the model are brought together by two numbers: pixel (x, y) of IMAGE, centres at +0.5, is
-X = (x - x0) * metres_per_pixel, Y = (y0 - y) * metres_per_pixel of ASSET, with (x0, y0) = `origin_px` the place of
+Pixel scale and origin relate the drawing to the model: pixel (x, y) of IMAGE, centres at +0.5, is
+X = (x - x0) * metres_per_pixel, Y = (y0 - y) * metres_per_pixel of ASSET, with (x0, y0) = `origin_px` the position of
 the ASSET origin on the drawing.
 """
 
@@ -27,14 +27,14 @@ BoolArray = NDArray[np.bool_]
 
 SSIM_WINDOW = 7
 MAX_SIDE_PX = 1536
-"""Of longer figures only every second, third ... pixel is measured: all would cost seconds and gigabytes."""
+"""Of larger figures only every second, third ... pixel is measured: all would cost seconds and gigabytes."""
 MAX_PSNR_DB = 100.0
-"""Reported for identical pictures, whose ratio is infinite: reports are JSON, which knows no infinity."""
+"""PSNR of identical pictures in reports: the true value is infinite, which JSON cannot represent."""
 
 
 @dataclass(frozen=True)
 class FrontSimilarity:
-    """How much the model's front looks like the drawing, over the pixels that both cover.
+    """Similarity of the model's front and the drawing, over the pixels that both cover.
 
     psnr_db : peak signal-to-noise ratio of the sRGB values, dB, at most `MAX_PSNR_DB`
     ssim : mean structural similarity of the three channels, 7 × 7 windows, 1 where identical
@@ -49,26 +49,26 @@ def silhouette_iou(
 ) -> float:
     """Intersection over union of the model's front silhouette and the drawn one, at the drawing's pixel centres.
 
-    mesh : ASSET; mask : (H, W) bool, IMAGE. What the model shows beside the drawing counts against it.
+    mesh : ASSET; mask : (H, W) bool, IMAGE. Parts of the model outside of the drawing count against it.
     """
     if not mask.any():
         return 0.0
     (x0, y0), (x1, y1) = box_of(mask)
     left, bottom, right, top = (edge / metres_per_pixel for edge in view_bounds(mesh, 0.0))
     model = np.array([[origin_px[0] + left, origin_px[1] - top], [origin_px[0] + right, origin_px[1] - bottom]])
-    # A model reaching out further than another figure's size on each side has a wrong scale or place: the rest of it
-    # is not counted, the answer is below a fifth anyway.
+    # A model that extends by more than the figure's size on each side has a wrong scale or position: the rest of it is
+    # not counted, since the result is below a fifth anyway.
     width, height = x1 - x0, y1 - y0
     u0, v0 = np.clip(np.floor(model[0]), (x0 - width, y0 - height), (x0, y0)).astype(int).tolist()
     u1, v1 = np.clip(np.ceil(model[1]), (x1, y1), (x1 + width, y1 + height)).astype(int).tolist()
     step = -(-max(width, height) // MAX_SIDE_PX)
     drawn = every_step(mask, (u0, v0, u1, v1), step)
     origin = coarse_point(origin_px, (u0, v0), step)
-    seen = (
+    visible = (
         front_pixels(mesh, (drawn.shape[1], drawn.shape[0]), step * metres_per_pixel, origin, 1, "normals")[..., 3] > 0
     )
-    # Coarse rows can miss lines of a pixel's width altogether.
-    return float((drawn & seen).sum() / max(int((drawn | seen).sum()), 1))
+    # Coarse rows can miss lines of one pixel's width altogether.
+    return float((drawn & visible).sum() / max(int((drawn | visible).sum()), 1))
 
 
 def front_similarity(
@@ -87,10 +87,10 @@ def front_similarity(
     ----------
     mesh : ASSET
     rgba : (H, W, 4) uint8, IMAGE; straight alpha, opaque for scans
-    mask : (H, W) bool, IMAGE; what of the drawing is the figure
+    mask : (H, W) bool, IMAGE; the figure in the drawing
     background : sRGB, behind both
-    samples : rays along each side of a pixel. One, through its centre, gives the drawing's own pixels back where the
-        texture holds them; 2 measures the blur of the box filter too (pen drawing, exact texture: 29 dB instead of
+    samples : rays along each side of a pixel. One, through its centre, returns the drawing's own pixels where the
+        texture contains them; 2 also measures the blur of the box filter (pen drawing, exact texture: 29 dB instead of
         100, SSIM lower by 0.013).
     """
     from skimage.metrics import structural_similarity
@@ -121,7 +121,7 @@ def front_similarity(
 
 
 def shape_measures(mesh: TexturedMesh) -> dict[str, Any]:
-    """What trimesh says of the unsplit solid, independently of `exporters.solid`.
+    """Measures of the unsplit solid by trimesh, independently of `exporters.solid`.
 
     watertight : every edge has two triangles; winding_consistent : and they run along it in opposite directions;
     components : pieces connected over edges; genus : handles, None unless both of the former;
@@ -145,7 +145,7 @@ def shape_measures(mesh: TexturedMesh) -> dict[str, Any]:
 
 
 def load_textured(path: Path | str) -> TexturedMesh:
-    """Read a .glb, .gltf, .ply or .obj file with one mesh back, as any other program would (trimesh).
+    """Read a .glb, .gltf, .ply or .obj file with one mesh, by trimesh.
 
     Vertices at equal positions become one vertex of the solid; part labels, observed mask and levels of detail are
     not read. Raises ExportError where the file cannot be read or does not hold exactly one triangle mesh.
@@ -160,7 +160,7 @@ def load_textured(path: Path | str) -> TexturedMesh:
         return _textured(scene, nodes, Path(path))
     except ExportError:
         raise
-    except Exception as error:  # trimesh raises whatever its parsers stumble over
+    except Exception as error:  # the parsers of trimesh raise exceptions of many kinds
         reason = " ".join(str(error).split())[:120] or type(error).__name__
         raise ExportError(path, f"cannot be read ({reason})", "give a .glb, .gltf, .ply or .obj file") from None
 
@@ -181,7 +181,7 @@ def _textured(scene: Any, nodes: list[Any], path: Path) -> TexturedMesh:
     uv, texture, colors = None, None, None
     if isinstance(body.visual, trimesh.visual.TextureVisuals):
         if body.visual.uv is not None:
-            # trimesh turns v round on reading; here row 0 is v = 0, as in the file.
+            # trimesh flips v on reading; here row 0 is v = 0, as in the file.
             uv = np.clip(body.visual.uv * (1, -1) + (0, 1), 0.0, 1.0).astype(np.float32)
         # glTF's material, and that of OBJ.
         image = getattr(body.visual.material, "baseColorTexture", None) or getattr(body.visual.material, "image", None)
@@ -217,7 +217,7 @@ def front_pixels(
     samples: int,
     mode: Any,
 ) -> ByteArray:
-    """(H, W, 4) uint8, the front on the pixels of the drawing; `size` (width, height)."""
+    """(H, W, 4) uint8, rendering of the front at the pixels of the drawing; size : (width, height)."""
     width, height = size
     x0, y0 = origin_px
     left, bottom, right, top = -x0, y0 - height, width - x0, y0
@@ -226,7 +226,7 @@ def front_pixels(
 
 
 def box_of(mask: BoolArray) -> tuple[tuple[int, int], tuple[int, int]]:
-    """First and behind-last (x, y) of what is set."""
+    """Bounding box of a mask: first and one-past-last (x, y)."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return (int(columns[0]), int(rows[0])), (int(columns[-1]) + 1, int(rows[-1]) + 1)
 
@@ -235,7 +235,7 @@ def every_step(image: NDArray[Any], edges: tuple[int, int, int, int], step: int)
     """Every step-th pixel between the edges x0, y0, x1, y1, the first one step // 2 inside; zero outside the image."""
     x0, y0, x1, y1 = edges
     first_x, first_y = x0 + step // 2, y0 + step // 2
-    # One pixel at least, also of what is thinner than a step.
+    # At least one pixel, even of regions thinner than a step.
     column, row = np.arange(first_x, max(x1, first_x + 1), step), np.arange(first_y, max(y1, first_y + 1), step)
     there_x, there_y = ((at >= 0) & (at < n) for at, n in ((column, image.shape[1]), (row, image.shape[0])))
     result = np.zeros((len(row), len(column), *image.shape[2:]), image.dtype)
@@ -244,7 +244,7 @@ def every_step(image: NDArray[Any], edges: tuple[int, int, int, int], step: int)
 
 
 def coarse_point(point_px: tuple[float, float], start: tuple[int, int], step: int) -> tuple[float, float]:
-    """Where a point of the image lies among the pixels of `every_step`, whose centres are those of the pixels taken."""
+    """Position of a point of the image in pixels of `every_step`, whose centres are those of the pixels taken."""
     shift = step // 2 + 0.5 - step / 2
     return (point_px[0] - start[0] - shift) / step, (point_px[1] - start[1] - shift) / step
 

@@ -1,7 +1,7 @@
-"""How sound a finished model is as a solid: thin walls, slivers, shells inside shells, surfaces through each other.
+"""Measures of a finished model as a solid: thin walls, slivers, nested shells, self-intersections.
 
-Measures take closed surfaces in ASSET, metres, of a figure 1.79 m high. `fig2mesh.measure.front` holds what shows from
-the drawing's side.
+Measures take closed surfaces in ASSET, metres, of a figure 1.79 m high. For defects visible from the front see
+`fig2mesh.measure.front`.
 """
 
 from __future__ import annotations
@@ -21,43 +21,43 @@ from fig2mesh.mesh.topology import check_solid, component_volumes, face_componen
 from fig2mesh.records import Mesh
 
 SLIVER = 0.05
-"""Triangles of a smaller quality are slivers: the height of a cap is below 2, of a needle below 3 % of its length."""
+"""Quality threshold of slivers: the height of a cap is below 2, of a needle below 3 % of its length."""
 START = 1e-5
-"""Metres below the surface at which a ray across the wall starts, so that it does not meet its own triangle."""
+"""Metres below the surface at which a ray across the wall starts, so that it does not hit its own triangle."""
 
 
 @dataclass(frozen=True)
 class Wall:
     """Thickness of a solid across its walls, mm.
 
-    least_mm : of all samples; quantile_mm : 0.1 % of the samples are thinner
+    min_mm : of all samples; quantile_mm : 0.1 % of the samples are thinner
     """
 
-    least_mm: float
+    min_mm: float
     quantile_mm: float
 
 
 @dataclass(frozen=True)
-class Quality:
-    """Shape of the triangles: least and 1 % quantile of their quality, and the share below 0.05."""
+class TriangleQuality:
+    """Quality of triangles: minimum, 1 % quantile, and share of slivers, below 0.05."""
 
-    least: float
+    minimum: float
     quantile: float
     slivers: float
 
 
 @dataclass(frozen=True)
 class Laws:
-    """What has to hold of any solid, and what counts its form.
+    """Validity and topology of a solid.
 
     closed : every edge has a triangle on both sides; manifold : no edge has a third one, every vertex a single fan,
         and neighbours agree on the outside
     components : pieces connected over edges; genus : handles of all of them together,
         meaningful where closed and manifold
     inner_shells : components with negative volume, or with most vertices inside another one. They are cavities or
-        bodies within bodies: no view shows them, but slicers and volumes do.
+        bodies within bodies: no view shows them, but they affect slicers and volumes.
     crossing : triangles that pass through another one; a printed or cut model has no inside there
-    turned : share of vertices whose shading normal points against one of its triangles, which shows as dark spots
+    turned : share of vertices whose shading normal opposes that of one of its triangles, visible as dark spots
     """
 
     closed: bool
@@ -79,8 +79,8 @@ def thinnest_wall(mesh: Surface) -> Wall:
     """Thickness across the walls, by rays along the inward normal from 60,000 points spread evenly over the surface.
 
     This is the shape diameter of Shapira et al. (2008) with one ray instead of a cone: a cone averages away the very
-    places that break. What counts for making a solid is the least thickness, but a single acute rim drives the
-    minimum to zero; the 0.1 % quantile tells whether that is one rim or many. Rays that meet a front face have left
+    places that break. The minimum thickness decides whether a solid can be printed, but a single acute rim
+    reduces it to zero; the 0.1 % quantile shows whether that is one rim or many. Rays that hit a front face have left
     the solid through itself and are not counted.
     """
     import open3d as o3d
@@ -102,18 +102,18 @@ def thinnest_wall(mesh: Surface) -> Wall:
     return Wall(float(thickness.min()), float(np.quantile(thickness, 0.001)))
 
 
-def quality(mesh: Surface) -> Quality:
-    """How far the triangles are from equilateral: q = 4 sqrt(3) area / (sum of squared edges), 1 for equilateral.
+def quality(mesh: Surface) -> TriangleQuality:
+    """Quality of the triangles: q = 4 sqrt(3) area / (sum of squared edges), 1 for equilateral ones.
 
     Of the usual measures this one is smooth, bounded and zero for both kinds of sliver, needles and caps. Slivers have
     no reliable normal, break ray casting and physics engines, and vanish in coordinates of few bits.
     """
     values = triangle_quality(mesh.vertices, mesh.faces)
-    return Quality(float(values.min()), float(np.quantile(values, 0.01)), float((values < SLIVER).mean()))
+    return TriangleQuality(float(values.min()), float(np.quantile(values, 0.01)), float((values < SLIVER).mean()))
 
 
 def laws(mesh: TexturedMesh) -> Laws:
-    """Everything that has to hold of a model as a solid, at once."""
+    """Check a model as a solid."""
     body = solid_mesh(mesh)
     found = check_solid(body)
     return Laws(

@@ -1,1 +1,1 @@
-"""Pictures of figures and models: stills and turntables, with effects that cost nothing unless asked for."""
+"""Pictures of figures and models: stills and turntables, with effects that cost nothing unless requested."""

@@ -1,4 +1,4 @@
-"""How much work a picture was."""
+"""Counts of the work done for a picture."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of things done, summed over pictures.
+    """Numbers of operations, summed over pictures.
 
-    camera_rays : from the camera, one for each sample of each pixel; those of tiles that cannot see a part field are
-        answered without being traced
+    camera_rays : from the camera, one for each sample of each pixel, including those in tiles without a part field,
+        which are not traced
     normals : computed at points of the surface
     texture_samples : colours looked up in drawings or textures
     sight_rays : towards the viewer of the drawing

@@ -1,9 +1,9 @@
-"""Frames: pictures of a body, traced pixel by pixel in one pass, with only what is asked for.
+"""Frames: pictures of a body, traced pixel by pixel in one pass, with only the requested channels.
 
-The cost of a frame lies in the pixels that see the body. Before rays are sent, the bricks that hold the surface
-(`field.empty_space`) are thrown onto the tiles of the picture: a tile then knows the parts it may see and between which
-depths, so rays start next to the surface and empty tiles cost nothing. Rays that start elsewhere than at a camera, as
-those towards a lamp do, know nothing of their neighbours: `field.trace` is for them.
+The cost of a frame lies in the pixels that show the body. Before rays are traced, the bricks that contain the surface
+(`field.empty_space`) are projected onto the tiles of the picture. Each tile then has a list of the parts that it may
+show and their depth ranges, so that rays start next to the surface and empty tiles cost nothing. Use `field.trace` for
+rays that do not start at a camera, such as those towards a lamp.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _TILES_AT_ONCE = 4
 
 @dataclass(frozen=True)
 class Frame:
-    """H rows of W pixels, and the work done for them.
+    """H rows of W pixels, and counts of the work done for them.
 
     depth : (H, W) float32, distance along the ray, FIGURE units; infinite where nothing is hit
-    parts : (H, W) int32, index into `Body.parts`, -1 where nothing is hit; None where not asked for
-    normals : (H, W, 3) float32, FIGURE, zeros where nothing is hit; None where not asked for
-    rays : sent; pixels of tiles that cannot see the body need none
-    cells : looked at, as `Hits.steps`
-    normals_computed : number of them
+    parts : (H, W) int32, index into `Body.parts`, -1 where nothing is hit; None if not requested
+    normals : (H, W, 3) float32, FIGURE, zeros where nothing is hit; None if not requested
+    rays : number traced; pixels of tiles without the body need none
+    cells : number visited, as `Hits.steps`
+    normals_computed : number of normals
     """
 
     depth: FloatArray
@@ -53,9 +53,8 @@ def render_frame(
 ) -> Frame:
     """Trace a camera's picture, or its rows from the first to before the last.
 
-    with_parts, with_normals : for each combination a kernel of its own is compiled at first use, in which what is not
-        asked for does not occur
-    tolerance : as in `fig2mesh.field.trace.trace`, with which depths agree
+    with_parts, with_normals : channels to compute; for each combination a separate kernel is compiled at first use
+    tolerance : as in `fig2mesh.field.trace.trace`, whose depths agree with these
     """
     if not tolerance > 0:
         raise ValueError(f"tolerance: {tolerance}, expected a positive length")
@@ -84,7 +83,7 @@ def render_frame(
 
 
 def _window(camera: Camera, rows: tuple[int, int]) -> Window:
-    """Rows of a picture, for the kernels."""
+    """Window of a picture's rows, for the kernels."""
     width, height = camera.size
     if not 0 <= rows[0] < rows[1] <= height:
         raise ValueError(f"rows: {rows}, expected some of the {height} of the picture")

@@ -1,7 +1,7 @@
-"""Compiled kernels of frames: which tiles can see which grids, and the pixels themselves.
+"""Compiled kernels of frames: visibility of grids in tiles, and the pixels themselves.
 
-Pictures that a frame is not asked for come as None. The compiler makes a kernel of its own for each combination and
-drops the branches of the rest, so that an effect that is not wanted leaves no trace in the loop.
+Channels that are not requested are None. The compiler makes a separate kernel for each combination and drops the other
+branches, so that a channel that is not requested costs nothing in the loop.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from fig2mesh.field.march_kernel import FAR, march_grid, reciprocal, unit_normal
 TILE = 8
 """Pixels along the edge of a tile."""
 
-_EDGE = 1e-3  # of a pixel, by which bricks are thrown wider than rounding could make them narrower
-_SLACK = 1e-6  # of the depth, the same for depths, which are kept in single precision
+_EDGE = 1e-3  # of a pixel, added to projected bricks to outweigh rounding
+_SLACK = 1e-6  # of the depth, likewise for depths, which are stored in single precision
 
 
 class Window(NamedTuple):
@@ -31,9 +31,9 @@ class Window(NamedTuple):
     The ray of pixel (column, row) of the picture is origin + t direction, t the depth along the axis.
 
     columns, rows : size of the window; first_row : of the picture, the window's first
-    middle_column, middle_row : of the picture's middle, from the window's first pixel
+    middle_column, middle_row : of the picture's centre, from the window's first pixel
     origin, direction : (3, 3) float64, FIGURE, each as at the picture's pixel (0, 0), plus per column, plus per row
-    start : (3,) float64, FIGURE, from where depths count: the eye, or the middle of the plane of origins
+    start : (3,) float64, FIGURE, zero of depths: the eye, or the centre of the plane of origins
     axes : (3, 3) float64, right, up and back
     pixel : edge of a pixel, FIGURE units, in perspective at `distance`
     distance : from the eye to the plane in which pixels have that size
@@ -55,10 +55,10 @@ class Window(NamedTuple):
 
 
 @helper
-def seen_box(window: Window, box: NDArray[np.float64]) -> tuple[float, float, float, float, float, float]:
-    """Where a box (2, 3), FIGURE, lies in the window: least and greatest column, row and depth, as real numbers.
+def projected_box(window: Window, box: NDArray[np.float64]) -> tuple[float, float, float, float, float, float]:
+    """Projection of a box (2, 3), FIGURE, to the window: minimum and maximum column, row and depth, as real numbers.
 
-    In perspective columns and rows hold for boxes in front of the eye only.
+    In perspective, columns and rows are valid only for boxes in front of the eye.
     """
     mx = 0.5 * (box[0, 0] + box[1, 0]) - window.start[0]
     my = 0.5 * (box[0, 1] + box[1, 1]) - window.start[1]
@@ -95,8 +95,8 @@ def span_bricks(
 ) -> None:
     """Fill `spans` (G, tiles down, tiles across, 2) for the grids `first, first + step, ...`.
 
-    A span holds the depths between which rays of the tile can enter the grid's solid; (inf, -inf) where none can. A
-    grid whose box the rays start in may be met at once, also far from its surface: its span is everything.
+    A span is the range of depths at which rays of the tile can enter the grid's solid; (inf, -inf) where none can. If
+    rays may start inside the grid's box, its span covers all depths.
     """
     down, across = spans.shape[1], spans.shape[2]
     for g in range(first, grids.sizes.shape[0], step):
@@ -104,7 +104,7 @@ def span_bricks(
         spans[g, :, :, 1] = -np.inf
         if space.brick_starts[g] == space.brick_starts[g + 1]:
             continue
-        _, _, _, _, near, far = seen_box(window, grids.boxes[g])
+        _, _, _, _, near, far = projected_box(window, grids.boxes[g])
         if far < 0.0:
             continue
         if near <= 0.0:
@@ -112,7 +112,7 @@ def span_bricks(
             spans[g, :, :, 1] = np.inf
             continue
         for b in range(space.brick_starts[g], space.brick_starts[g + 1]):
-            left, right, top, bottom, near, far = seen_box(window, space.bricks[b])
+            left, right, top, bottom, near, far = projected_box(window, space.bricks[b])
             first_column, last_column = max(left - _EDGE, 0.0), min(right + _EDGE, window.columns - 1.0)
             first_row, last_row = max(top - _EDGE, 0.0), min(bottom + _EDGE, window.rows - 1.0)
             if first_column > last_column or first_row > last_row:
@@ -130,7 +130,7 @@ def span_bricks(
 def candidates_of_tile(
     spans: NDArray[np.float32], row: int, column: int, found: NDArray[np.int64], near: NDArray[np.float64]
 ) -> int:
-    """Write to `found` the grids that the tile may see, nearest first, and their nearest depths; return how many."""
+    """Write the grids that the tile may show to `found`, nearest first, with their depths; return their number."""
     count = 0
     for g in range(spans.shape[0]):
         a = np.float64(spans[g, row, column, 0])
@@ -202,7 +202,7 @@ def render_tile(
     parts: NDArray[np.int32] | None,
     normals: NDArray[np.float32] | None,
 ) -> tuple[int, int]:
-    """Fill a tile of the pictures that are not None; return cells looked at and normals computed."""
+    """Fill a tile of the channels that are not None; return numbers of cells visited and normals computed."""
     cells, computed = 0, 0
     for row in range(tile_row * TILE, min((tile_row + 1) * TILE, window.rows)):
         for column in range(tile_column * TILE, min((tile_column + 1) * TILE, window.columns)):
@@ -252,7 +252,7 @@ def clear_pixel(
     parts: NDArray[np.int32] | None,
     normals: NDArray[np.float32] | None,
 ) -> None:
-    """What a pixel holds that does not see the body."""
+    """Fill a pixel that does not show the body."""
     depth[row, column] = np.inf
     if parts is not None:
         parts[row, column] = -1
@@ -275,9 +275,9 @@ def render_tiles(
     parts: NDArray[np.int32] | None,
     normals: NDArray[np.float32] | None,
 ) -> tuple[int, int, int]:
-    """Fill the pictures that are not None for the blocks `first, first + step, ...` of tiles.
+    """Fill the channels that are not None for the blocks `first, first + step, ...` of tiles.
 
-    Returns how many rays were sent, cells looked at and normals computed.
+    Returns the numbers of rays traced, cells visited and normals computed.
     """
     down, across = spans.shape[1], spans.shape[2]
     found = np.empty(spans.shape[0], np.int64)

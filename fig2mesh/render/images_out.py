@@ -1,4 +1,4 @@
-"""Pictures into files: a still, an animation, a film, or a folder of numbered stills; whole or not at all."""
+"""Writers of pictures: a still, an animation, a video, or a folder of numbered stills; whole or not at all."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ NUMBERED = re.compile(r"\d{4,}\.png")
 class Kind:
     """A kind of output.
 
-    title : for people; moving : shows a turntable; transparent : keeps transparency as it is
+    title : for people; moving : shows a turntable; transparent : preserves transparency
     """
 
     title: str
@@ -46,7 +46,7 @@ KINDS: dict[str, Kind] = {
 
 
 def kind_of(path: str) -> str:
-    """The suffix of `KINDS` that a path asks for; a folder has none. Raises OutputError for others."""
+    """Suffix of a path, one of `KINDS`; "" for a folder. Raises OutputError for unknown suffixes."""
     if path.endswith(("/", os.sep)) or Path(path).is_dir():
         return FOLDER
     suffix = Path(path).suffix.lower()
@@ -57,40 +57,38 @@ def kind_of(path: str) -> str:
 
 
 def check_pictures(path: str, overwrite: bool, size: tuple[int, int], transparent: bool) -> None:
-    """Find out before the work begins what would keep pictures from being written. Raises OutputError, ExportError.
+    """Check that pictures can be written, before the work begins. Raises OutputError, ExportError.
 
-    size : (width, height); transparent : they are to have a transparent background
+    size : (width, height); transparent : whether their background is transparent
     """
     kind = kind_of(path)
     if kind == FOLDER:
         folder = Path(path)
         if folder.is_dir() and any(folder.iterdir()) and not overwrite:
-            raise OutputError(path, "is a folder with files in it", "pass --overwrite or another folder")
+            raise OutputError(path, "already exists and is not empty", "use --overwrite or choose another folder")
         check_file(path, folder / "0000.png", overwrite)
         return
     check_file(path, Path(path), overwrite)
     if kind == ".mp4":
         if shutil.which("ffmpeg") is None:
-            raise OutputError(
-                path, "MP4 needs the program ffmpeg, which is not on the PATH", "install it, or use .webp"
-            )
+            raise OutputError(path, "MP4 requires ffmpeg, which is not on the PATH", "install it, or use .webp")
         if transparent:
-            raise OutputError(path, "MP4 has no transparency", "give --background a colour, or use .webp")
+            raise OutputError(path, "MP4 does not support transparency", "give --background a colour, or use .webp")
         if size[0] % 2 or size[1] % 2:
-            raise OutputError(path, f"{size[0]}×{size[1]} px, but MP4 needs even numbers", "change --size")
+            raise OutputError(path, f"{size[0]}×{size[1]} px, but MP4 requires even numbers", "change --size")
 
 
 def write_pictures(path: str, pictures: Iterable[ByteArray], fps: float, overwrite: bool) -> tuple[Path, ...]:
-    """Write (H, W, 4) uint8 sRGB pictures with straight alpha, in the kind that the path names.
+    """Write (H, W, 4) uint8 sRGB pictures with straight alpha, in the format given by the path.
 
-    pictures : taken one by one while they are written; a .png has just one
-    fps : pictures a second; GIF knows only hundredths of a second for each
+    pictures : consumed one by one while they are written; a .png has just one
+    fps : pictures per second; GIF stores only hundredths of a second per picture
     returns : the files written
     """
     kind = kind_of(path)
     if kind == FOLDER:
         folder = Path(path)
-        # A shorter turntable must not end with pictures of a longer one.
+        # A shorter turntable must not end with pictures of an earlier, longer one.
         old = [file for file in folder.iterdir() if NUMBERED.fullmatch(file.name)] if folder.is_dir() else []
 
         def number(stage: Path) -> None:
@@ -112,14 +110,14 @@ def write_pictures(path: str, pictures: Iterable[ByteArray], fps: float, overwri
 
 
 def _webp(file: Path, pictures: Iterable[ByteArray], fps: float) -> None:
-    """Lossless: flat colours and lines suffer most from what lossy compression saves."""
+    """Write a lossless WebP: lossy compression would damage flat colours and lines."""
     first, *others = (Image.fromarray(picture) for picture in pictures)
     more = {"save_all": True, "append_images": others, "duration": round(1000 / fps), "loop": 0} if others else {}
     first.save(file, "WEBP", lossless=True, quality=60, method=4, exact=True, **more)
 
 
 def _gif(file: Path, pictures: Iterable[ByteArray], fps: float) -> None:
-    """256 colours for each picture, one of them transparent where any pixel is mostly so."""
+    """Write a GIF with 256 colours per picture, one of them transparent if any pixel is mostly transparent."""
     first, *others = (_indexed(picture) for picture in pictures)
     # Each picture replaces the one before, also where it is transparent.
     first.save(
@@ -149,7 +147,7 @@ def _indexed(picture: ByteArray) -> Image.Image:
 
 
 def _mp4(file: Path, pictures: Iterable[ByteArray], fps: float, path: str) -> None:
-    """H.264 through ffmpeg, in the pixel format that every player knows."""
+    """Write H.264 through ffmpeg, in the pixel format that every player supports."""
     program: subprocess.Popen[bytes] | None = None
     for picture in pictures:
         if program is None:
@@ -162,9 +160,9 @@ def _mp4(file: Path, pictures: Iterable[ByteArray], fps: float, path: str) -> No
         try:
             program.stdin.write(np.ascontiguousarray(picture[..., :3]).tobytes())
         except BrokenPipeError:
-            break  # it says below what it did not like
+            break  # the error is reported below
     assert program is not None
-    _, said = program.communicate()
+    _, errors = program.communicate()
     if program.returncode or not file.is_file():
-        reason = " ".join(said.decode(errors="replace").split())[:200] or f"exit code {program.returncode}"
+        reason = " ".join(errors.decode(errors="replace").split())[:200] or f"exit code {program.returncode}"
         raise OutputError(path, f"ffmpeg failed ({reason})", "install one with libx264, or use .webp")

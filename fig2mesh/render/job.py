@@ -24,7 +24,7 @@ from fig2mesh.render.effects import Effect, check_effects, parse_effects
 from fig2mesh.render.images_out import KINDS, check_pictures, kind_of, write_pictures
 from fig2mesh.render.model import SUFFIXES, read_model
 from fig2mesh.render.needs import needs
-from fig2mesh.render.picture import Request, render, view_of
+from fig2mesh.render.picture import PictureRequest, render, view_of
 from fig2mesh.render.request import RenderRequest
 from fig2mesh.render.scene import FieldScene, MeshScene, Scene
 from fig2mesh.render.sun import Sun, parse_time, sun_at, towards_sun
@@ -38,68 +38,70 @@ from georef.placement import check_lonlat
 log = logging.getLogger("fig2mesh")
 
 FRAMES, FPS = 36, 12.5
-"""A turn in three seconds; a GIF can keep 8 hundredths of a second for each frame exactly."""
+"""A turn in three seconds; GIF can represent 8 hundredths of a second per frame exactly."""
 
-MOST_RAYS = 1 << 26
-"""For one picture: 8192 x 8192 pixels of one ray need 2 GB."""
+MAX_RAYS = 1 << 26
+"""Rays of one picture: 8192 x 8192 pixels with one ray each need 2 GB."""
 
 Colour = tuple[int, int, int]
 
 
 @dataclass
 class _Total:
-    """What the pictures made so far took."""
+    """Number of pictures made so far, and the counts of their work."""
 
     counts: Counts = field(default_factory=Counts)
     pictures: int = 0
 
 
 def run(request: RenderRequest) -> None:
-    """Do what `fig2mesh render` asks for."""
-    # Everything that can be refused is refused before the work begins.
+    """Run `fig2mesh render`."""
+    # Whatever can be rejected is rejected before the work begins.
     wanted = parse_effects(request.effects)
     fields = request.figure.suffix.lower() not in SUFFIXES
     check_effects(request.mode, wanted, fields=fields)
     drawing = (request.mask, request.keypoints, request.part_labels, request.bbox, request.textures)
     if not fields and drawing != (None,) * 5:
-        raise InputError(request.figure, "is a finished model, which needs no --mask, --keypoints …", "leave them out")
+        raise InputError(
+            request.figure, "a finished model cannot be combined with --mask, --keypoints …", "leave them out"
+        )
     sun = _sun(wanted, request.lonlat, request.time)
     moving = KINDS[kind_of(request.output)].moving
     count, rate = _timing(moving, request.frames, request.fps, request.seconds, request.output)
-    look = _picture_request(request, wanted, sun)
-    check_pictures(request.output, request.overwrite, request.size, look.background is None)
+    first = _picture_request(request, wanted, sun)
+    check_pictures(request.output, request.overwrite, request.size, first.background is None)
     if request.report is not None:
         check_text(request.report, request.overwrite)
     if sun is not None and not sun.up:
-        log.info("the sun is %.1f° below the horizon: only the sky's light is left", -sun.elevation_deg)
+        log.info("the sun is %.1f° below the horizon: only the sky gives light", -sun.elevation_deg)
 
     start = time.perf_counter()
     scene: Scene
     if fields:
-        scene = field_scene(read_figure(**request.reading()), request.settings(), look)
+        scene = field_scene(read_figure(**request.reading()), request.settings(), first)
     else:
-        scene = _mesh_scene(request.figure, look)
+        scene = _mesh_scene(request.figure, first)
     ready = time.perf_counter()
     total = _Total()
-    written = write_pictures(request.output, _turntable(scene, look, count, total), rate, request.overwrite)
+    written = write_pictures(request.output, _turntable(scene, first, count, total), rate, request.overwrite)
     done = time.perf_counter()
     if request.report is not None:
-        facts = _facts(request, look, scene, total, sun)
+        facts = _facts(request, first, scene, total, sun)
         facts["seconds"] = {"scene": round(ready - start, 3), "pictures": round(done - ready, 3)}
         facts["files"] = [path.name for path in written]
         write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     log.info("%s", request.output)
 
 
-def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun | None) -> Request:
-    """What each picture shows; the yaw is that of the first."""
+def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun | None) -> PictureRequest:
+    """Request of the first picture; the others differ in yaw."""
     bearing = parse_facing(request.facing)
     paper = _background(request.background, KINDS[kind_of(request.output)].transparent)
     samples = request.samples or (1 if request.mode in ("depth", "parts") else 2)
-    if request.size[0] * request.size[1] * samples**2 > MOST_RAYS:
-        found = f"{request.size[0]} {request.size[1]} with {samples} samples a side"
-        raise InputError("--size", found, "give less of either")
-    return Request(
+    if request.size[0] * request.size[1] * samples**2 > MAX_RAYS:
+        found = f"{request.size[0]} {request.size[1]} with --samples {samples} is too large"
+        raise InputError("--size", found, "reduce either")
+    return PictureRequest(
         request.mode,
         wanted,
         request.size,
@@ -114,8 +116,8 @@ def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun
     )
 
 
-def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Iterator[ByteArray]:
-    """`count` pictures of a full turn, the first as asked for."""
+def _turntable(scene: Scene, request: PictureRequest, count: int, total: _Total) -> Iterator[ByteArray]:
+    """Yield `count` pictures of a full turn, beginning with the requested one."""
     for index in range(count):
         picture = render(scene, replace(request, yaw_deg=request.yaw_deg + 360.0 * index / count))
         total.counts += picture.counts
@@ -124,8 +126,8 @@ def _turntable(scene: Scene, request: Request, count: int, total: _Total) -> Ite
         yield picture.rgba
 
 
-def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldScene:
-    """The part fields of a figure and, where the request shows them, its colours; nothing is meshed."""
+def field_scene(figure: Figure, settings: Settings, request: PictureRequest) -> FieldScene:
+    """Scene of the part fields of a figure and, if the request shows them, its colours."""
     goals = (body, parts, textures) if needs(request.mode, request.effects).textures else (body, parts)
     done = run_stages(figure, settings, goals)
     fields, sources = done.results[body], done.results[textures] if textures in goals else None
@@ -134,16 +136,16 @@ def field_scene(figure: Figure, settings: Settings, request: Request) -> FieldSc
     return FieldScene(fields, sources, image_frame(done.figure))
 
 
-def _mesh_scene(path: Path, request: Request) -> MeshScene:
+def _mesh_scene(path: Path, request: PictureRequest) -> MeshScene:
     if not path.is_file():
         raise FigureError(path, "no such file", "check the path of the model")
     mesh = read_model(path)
     if not len(mesh.faces):
-        raise FigureError(path, "no triangles", "give another model")
+        raise FigureError(path, "has no triangles", "give another model")
     if request.mode == "textured" and mesh.texture is None and mesh.colors is None:
         raise FigureError(path, "has no colours", "use --mode clay")
     if request.mode == "parts" and mesh.parts is None:
-        raise FigureError(path, "does not say which part is where", "use a GLB made without --no-evidence")
+        raise FigureError(path, "has no part labels", "use a GLB made without --no-evidence")
     return MeshScene(mesh)
 
 
@@ -151,12 +153,12 @@ def _sun(effects: frozenset[Effect], lonlat: tuple[float, float] | None, text: s
     if "sun" not in effects:
         for name, value in (("--lonlat", lonlat), ("--time", text)):
             if value is not None:
-                raise InputError(name, "only the effect sun asks for it", "add --effects sun, or leave it out")
+                raise InputError(name, "requires --effects sun", "add --effects sun, or leave it out")
         return None
     if lonlat is None:
-        raise InputError("--effects", "sun without a place", "pass --lonlat LON LAT")
+        raise InputError("--effects", "sun requires --lonlat", "add --lonlat LON LAT")
     if text is None:
-        raise InputError("--effects", "sun without a time", "pass --time 2026-06-21T14:00+02:00")
+        raise InputError("--effects", "sun requires --time", "add --time, such as --time 2026-06-21T14:00+02:00")
     check_lonlat(*lonlat)
     return sun_at(*lonlat, parse_time(text))
 
@@ -164,21 +166,23 @@ def _sun(effects: frozenset[Effect], lonlat: tuple[float, float] | None, text: s
 def _timing(
     moving: bool, frames: int | None, fps: float | None, seconds: float | None, output: str
 ) -> tuple[int, float]:
-    """Number of pictures, and how many a second; any two of the three options say the third."""
+    """Number of pictures, and their rate per second; any two of the three options determine the third."""
     if not moving:
         if (frames or 1) != 1 or fps is not None or seconds is not None:
-            found = "a .png is one picture, without --frames, --fps, --seconds"
+            found = "a .png cannot be combined with --frames, --fps or --seconds"
             raise InputError(output, found, "use .webp, .gif, .mp4 or a folder")
         return 1, FPS
     if frames is not None and fps is not None and seconds is not None:
-        raise InputError("--seconds", "given with --frames and --fps", "give two of the three")
+        raise InputError("--seconds", "cannot be combined with both --frames and --fps", "give two of the three")
     if seconds is not None:
         count = frames or max(1, round(seconds * (fps or FPS)))
         rate = count / seconds
     else:
         count, rate = frames or FRAMES, fps or FPS
     if count > 10_000 or not 0.01 <= rate <= 100:
-        raise InputError("--seconds", f"{count} pictures, {rate:g} a second", "ask for at most 10000, and 100 a second")
+        raise InputError(
+            "--seconds", f"{count} pictures at {rate:g} per second", "give at most 10000, at 0.01 to 100 per second"
+        )
     return count, rate
 
 
@@ -192,15 +196,17 @@ def _colour(option: str, text: str) -> Colour:
     try:
         red, green, blue = ImageColor.getrgb(text)[:3]
     except ValueError:
-        raise InputError(option, f"{text!r} is no colour", "give a name such as ivory, or #rrggbb") from None
+        raise InputError(option, f"{text!r} is not a colour", "give a name such as ivory, or #rrggbb") from None
     return red, green, blue
 
 
-def _facts(asked: RenderRequest, request: Request, scene: Scene, total: _Total, sun: Sun | None) -> dict[str, Any]:
+def _facts(
+    options: RenderRequest, request: PictureRequest, scene: Scene, total: _Total, sun: Sun | None
+) -> dict[str, Any]:
     view = view_of(scene, request)
     return {
-        "input": asked.figure.name,
-        "output": Path(asked.output).name,
+        "input": options.figure.name,
+        "output": Path(options.output).name,
         "surface": "fields" if isinstance(scene, FieldScene) else "mesh",
         "mode": request.mode,
         "effects": sorted(request.effects),

@@ -1,4 +1,4 @@
-"""Finished models back from their files, with the part labels that pictures of parts need."""
+"""Reader of finished models, with the part labels that pictures of parts need."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from georef.untrusted.damage import DamagedFile
 from georef.untrusted.image_file import check_header
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
-"""Files that are models; everything else is taken for a drawing."""
+"""Suffixes of models; every other file is taken for a drawing."""
 
 COMPRESSION = {*MESHOPT, "KHR_draco_mesh_compression", "KHR_texture_basisu"}
 """Extensions of glTF files that trimesh, which reads models, cannot read."""
 
 
 def read_model(path: Path) -> TexturedMesh:
-    """The triangles of a file, ASSET, with colours and part labels where it has them. Raises ExportError."""
+    """Read the triangles of a file, ASSET, with colours and part labels if it has them. Raises ExportError."""
     if path.suffix.lower() not in (".glb", ".gltf"):
         return load_textured(path)
     gltf = read_gltf(path)
     try:
         packed = sorted(set(gltf.document.get("extensionsRequired", [])) & COMPRESSION)
         if packed:
-            raise ExportError(path, f"is compressed ({', '.join(packed)})", "give the file written without --profile")
+            raise ExportError(path, f"is compressed ({', '.join(packed)})", "give a file written without --profile")
         _check_costs(gltf)
         mesh = load_textured(path)
         labels = _gltf_labels(gltf)
     except DamagedFile as error:
-        raise ExportError(path, f"broken glTF ({error})", "see fig2mesh validate") from error
+        raise ExportError(path, f"invalid glTF ({error})", "see fig2mesh validate") from error
     return replace(mesh, parts=labels) if labels is not None and len(labels) == len(mesh.vertices) else mesh
 
 
 def _check_costs(gltf: Gltf) -> None:
-    """Raise DamagedFile for what trimesh would take on trust: counts, trees of nodes, files beside, their pixels."""
+    """Raise DamagedFile for what trimesh does not check: counts, trees of nodes, external files, their pixels."""
     gltf.instances()
     for index in range(len(gltf.items("accessors"))):
         gltf.accessor(index)

@@ -1,4 +1,4 @@
-"""What a picture has to find out about the surface, derived from what is asked for."""
+"""Properties of the surface that a picture needs, derived from its mode and effects."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from typing import Literal
 from fig2mesh.render.effects import Effect, Mode
 
 AO_SAMPLES = 8
-"""Rays into the hemisphere over each point; a pixel of 2 x 2 samples has four differently turned sets of them."""
+"""Rays into the hemisphere over each point; the four sets of a pixel of 2 x 2 samples are rotated differently."""
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What each point that is seen costs.
+    """Work for each visible point.
 
-    normals : its normal
-    labels : its part
-    textures : its colour from the drawing or the texture
-    sight : a ray towards the viewer of the drawing, which tells whether the drawing shows it
-    lamp : the light that falls on it: "none", "head" (beside the camera, what makes clay readable), "key", "sun"
-    shadow : a ray towards the lamp
-    ao_samples : rays into its hemisphere
-    edges : comparison with its neighbours
-    blend : both colours where the drawing shows it at an angle
+    normals : compute its normal
+    labels : find its part
+    textures : look up its colour in the drawing or the texture
+    sight : trace a ray towards the viewer of the drawing, to find whether the drawing shows it
+    lamp : light that falls on it: "none", "head" (next to the camera, for clay), "key", "sun"
+    shadow : trace a ray towards the lamp
+    ao_samples : number of rays into its hemisphere
+    edges : compare it with its neighbours
+    blend : look up both colours where the drawing shows it at an angle
     """
 
     normals: bool = False
@@ -39,15 +39,14 @@ class Needs:
 
     @property
     def points(self) -> bool:
-        """Whether its place in space is needed: further rays start there, and ink compares places."""
+        """Whether its position is needed: secondary rays start there, and ink lines compare positions."""
         return self.sight or self.shadow or self.ao_samples > 0 or self.edges
 
 
 def needs(mode: Mode, effects: Set[Effect], *, fields: bool = True) -> Needs:
-    """The least that shows `mode` with `effects`.
+    """Minimum work that shows `mode` with `effects`.
 
-    fields : the surface is that of part fields, whose points are coloured by normal and sight; the points of a mesh
-        find their colours in its texture
+    fields : the surface is that of part fields, whose colours depend on normal and visibility; a mesh has a texture
     """
     textures = mode == "textured"
     lamp: Literal["none", "head", "key", "sun"] = "head" if mode == "clay" else "none"

@@ -1,4 +1,4 @@
-"""Ink lines where neighbouring rays meet different things."""
+"""Ink lines between neighbouring pixels that show different surfaces."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 STEP = 0.012
-"""A pixel's point so far off the plane of its neighbour's lies on another surface; share of the figure's height."""
+"""Distance from the tangent plane of the neighbouring pixel beyond which a point lies on another surface; share of the
+figure's height."""
 
 CREASE_COSINE = 0.5
-"""Surfaces that turn by more than 60 degrees from one pixel to the next have a crease there."""
+"""Cosine of the angle between neighbouring normals, 60 degrees, beyond which there is a crease."""
 
 JOINT_COSINE = 0.94
-"""Where parts meet 20 degrees are enough. Parts of one limb overlap and share their surface: no line belongs there,
-and it would be a scribble, as either part may be the one that is met."""
+"""The same where parts meet: 20 degrees. A border of parts alone makes no line: parts of one limb overlap and share
+their surface, and either may be hit there."""
 
 SPECK = 10.0
-"""Pieces of a line with fewer pixels are left out, widths."""
+"""Minimum number of pixels of a piece of a line, in line widths."""
 
 
 def ink_cover(
@@ -30,7 +31,7 @@ def ink_cover(
 ) -> NDArray[np.float64]:
     """(H, W) share of each pixel that lines cover.
 
-    kinds : (H, W) what is seen; 0 is nothing
+    kinds : (H, W) label of the visible surface; 0 for none
     points, normals : (H, W, 3) of the surface where there is one
     pixel, height : of a pixel, of the figure, in the units of the points
     width : of the line, pixels; half of it on either side of the border
@@ -43,13 +44,13 @@ def ink_cover(
         border = (kinds[first] > 0) != (kinds[second] > 0)
         a, b = normals[first][both], normals[second][both]
         way = points[second][both] - points[first][both]
-        # Off the tangent plane: on a round limb seen at its rim depth changes fast, but along the plane.
+        # Distance from the tangent plane: at the rim of a round limb depth changes fast, but along the plane.
         off = np.maximum(np.abs((way * a).sum(axis=1)), np.abs((way * b).sum(axis=1)))
         bend = np.where(kinds[first][both] == kinds[second][both], CREASE_COSINE, JOINT_COSINE)
         border[both] = (off > max(STEP * height, 2 * pixel)) | ((a * b).sum(axis=1) < bend)
         beside[first] |= border
         beside[second] |= border
-    # Specks are no lines.
+    # Drop specks.
     pieces, _ = ndimage.label(beside, np.ones((3, 3)))
     beside &= np.bincount(pieces.ravel())[pieces] >= SPECK * width
     if not beside.any():

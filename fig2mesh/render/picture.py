@@ -1,4 +1,4 @@
-"""One picture of a scene: rays, then for the points they meet what the request needs, and nothing else."""
+"""Rendering of one picture of a scene: camera rays, then, for the points they hit, only what the request needs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from fig2mesh.render.effects import Effect, Mode
 from fig2mesh.render.needs import Needs, needs
 from fig2mesh.render.outline import ink_cover
 from fig2mesh.render.scene import CLEARANCE, FieldScene, Floats, Scene, height_of
-from fig2mesh.render.seen import UP, Seen, look, to_ground
 from fig2mesh.render.shading import (
     CLAY,
     GROUND,
@@ -27,26 +26,27 @@ from fig2mesh.render.shading import (
     lit,
     turns_at,
 )
-from fig2mesh.render.view import View, make_view
+from fig2mesh.render.view import CameraView, make_view
+from fig2mesh.render.visible import UP, VisiblePoints, to_ground, visible_points
 from fig2mesh.skeleton import PART_COLOURS
 
 RAYS_AT_ONCE = 1 << 19
-"""Pictures are made in bands of rows with so many rays: some 100 MB."""
+"""Rays per band of rows: some 100 MB."""
 
 AO_REACH = 0.25
-"""What is further away shades nothing, share of the figure's height."""
+"""Range of ambient occlusion, share of the figure's height."""
 
 
 @dataclass(frozen=True)
-class Request:
-    """What a picture shows.
+class PictureRequest:
+    """Parameters of a picture.
 
-    effects : names, see `fig2mesh.render.effects`; smooth-union is a matter of the scene
+    effects : names, see `fig2mesh.render.effects`; smooth-union is part of the scene
     size : (width, height) pixels
-    yaw_deg, pitch_deg : where the camera stands, see `fig2mesh.field.camera`
+    yaw_deg, pitch_deg : direction of the camera, see `fig2mesh.field.camera`
     samples : rays along each side of a pixel
     background : sRGB; None: transparent
-    ground : a disc under the feet
+    ground : whether to show a disc under the feet
     sun : (3,) unit vector towards the sun in the scene's axes; None: it is below the horizon
     outline_px, outline_colour : width in pixels and sRGB of ink lines
     """
@@ -69,15 +69,15 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """rgba : (H, W, 4) uint8 sRGB, straight alpha; counts : what it took."""
+class RenderedPicture:
+    """rgba : (H, W, 4) uint8 sRGB, straight alpha; counts : of the work."""
 
     rgba: ByteArray
     counts: Counts
 
 
-def view_of(scene: Scene, request: Request) -> View:
-    """The camera of a request; turning alone neither moves nor zooms it."""
+def view_of(scene: Scene, request: PictureRequest) -> CameraView:
+    """Camera of a request; a change of yaw neither moves nor zooms it."""
     return make_view(
         scene.bounds,
         request.size,
@@ -88,13 +88,13 @@ def view_of(scene: Scene, request: Request) -> View:
     )
 
 
-def render(scene: Scene, request: Request) -> Picture:
-    """A picture of a scene. Same scene, same request: same bytes."""
+def render(scene: Scene, request: PictureRequest) -> RenderedPicture:
+    """Render a picture of a scene. The same scene and request give the same bytes."""
     need = needs(request.mode, request.effects, fields=isinstance(scene, FieldScene))
     view = view_of(scene, request)
     width, height = request.size
-    fine = replace(view, camera=replace(view.camera, size=(width * request.samples, height * request.samples)))
-    # Lines of one band reach into the next: a border of rows is drawn with each, and cut off again.
+    sampled = replace(view, camera=replace(view.camera, size=(width * request.samples, height * request.samples)))
+    # Lines of one band extend into the next: a border of rows is rendered with each band, and cropped.
     border = math.ceil(request.outline_px / 2) + 2 if need.edges else 0
     rows = max(1, RAYS_AT_ONCE // (width * request.samples**2) - 2 * border)
     result = np.empty((height, width, 4), np.float32)
@@ -102,61 +102,67 @@ def render(scene: Scene, request: Request) -> Picture:
     for first in range(0, height, rows):
         last = min(first + rows, height)
         band = (max(first - border, 0), min(last + border, height))
-        rgba, spent = _band(scene, request, need, fine, (band[0] * request.samples, band[1] * request.samples))
+        rgba, spent = _band(scene, request, need, sampled, (band[0] * request.samples, band[1] * request.samples))
         pixels = rgba.reshape(band[1] - band[0], request.samples, width, request.samples, 4).mean(axis=(1, 3))
         result[first:last] = pixels[first - band[0] : last - band[0]]
         counts += spent
-    return Picture(straight_bytes(result, request.background), counts)
+    return RenderedPicture(straight_bytes(result, request.background), counts)
 
 
-def _band(scene: Scene, request: Request, need: Needs, view: View, rows: tuple[int, int]) -> tuple[Floats, Counts]:
-    """(rows, W, 4) premultiplied colours 0-255 and coverage, one for every ray of the rows."""
-    seen, counts = look(scene, view.camera, rows, need, with_ground=request.ground)
-    colours, spent = _colours(scene, request, need, view, seen)
+def _band(
+    scene: Scene, request: PictureRequest, need: Needs, view: CameraView, rows: tuple[int, int]
+) -> tuple[Floats, Counts]:
+    """(rows, W, 4) premultiplied colours 0-255 and coverage of the rays of some rows."""
+    visible, counts = visible_points(scene, view.camera, rows, need, with_ground=request.ground)
+    colours, spent = _colours(scene, request, need, view, visible)
     counts += spent
     if need.lamp != "none" or need.ao_samples:
-        light, spent = _light(scene, request, need, seen)
+        light, spent = _light(scene, request, need, visible)
         colours = lit(colours, light)
         counts += spent
-    rgba = np.zeros((*seen.shape, 4))
+    rgba = np.zeros((*visible.shape, 4))
     flat = rgba.reshape(-1, 4)
-    flat[seen.pixels, :3], flat[seen.pixels, 3] = colours, 1.0
+    flat[visible.pixels, :3], flat[visible.pixels, 3] = colours, 1.0
     if need.edges:
-        cover = _ink(scene, request, seen)[..., None]
+        cover = _ink(scene, request, visible)[..., None]
         rgba = rgba * (1 - cover) + cover * np.array([*request.outline_colour, 1.0])
         counts += Counts(pixels_compared=len(flat))
     return rgba, counts
 
 
-def _colours(scene: Scene, request: Request, need: Needs, view: View, seen: Seen) -> tuple[Floats, Counts]:
-    """(M, 3) sRGB 0-255 of the points before any light."""
+def _colours(
+    scene: Scene, request: PictureRequest, need: Needs, view: CameraView, visible: VisiblePoints
+) -> tuple[Floats, Counts]:
+    """(M, 3) sRGB 0-255 of the points, unlit."""
     counts = Counts()
     if request.mode == "depth":
-        _, directions = seen.camera.lines(seen.pixels, seen.rows[0])
-        away = seen.depth * -(directions @ seen.camera.axes[2])
+        _, directions = visible.camera.lines(visible.pixels, visible.rows[0])
+        away = visible.depth * -(directions @ visible.camera.axes[2])
         share = np.clip((view.far - away) / (view.far - view.near), 0.0, 1.0)
         return np.repeat(255.0 * share[:, None], 3, axis=1), counts
     if request.mode == "normals":
-        return 127.5 * (seen.normals @ seen.camera.axes.T + 1.0), counts
-    colours = np.empty((len(seen.pixels), 3))
-    colours[seen.ground] = GROUND
+        return 127.5 * (visible.normals @ visible.camera.axes.T + 1.0), counts
+    colours = np.empty((len(visible.pixels), 3))
+    colours[visible.ground] = GROUND
     if request.mode == "textured":
-        colours[seen.figure], counts = scene.colours(seen.surface, need)
+        colours[visible.figure], counts = scene.colours(visible.surface, need)
     elif request.mode == "clay":
-        colours[seen.figure] = CLAY
+        colours[visible.figure] = CLAY
     else:
-        colours[seen.figure] = np.array(PART_COLOURS, np.float64)[seen.surface.labels]
+        colours[visible.figure] = np.array(PART_COLOURS, np.float64)[visible.surface.labels]
     return colours, counts
 
 
-def _light(scene: Scene, request: Request, need: Needs, seen: Seen) -> tuple[Floats, Counts]:
+def _light(scene: Scene, request: PictureRequest, need: Needs, visible: VisiblePoints) -> tuple[Floats, Counts]:
     """(M,) linear light on the points."""
-    counts, normals = Counts(), seen.normals
-    start = seen.points + CLEARANCE * height_of(scene) * normals if need.shadow or need.ao_samples else seen.points
+    counts, normals = Counts(), visible.normals
+    start = (
+        visible.points + CLEARANCE * height_of(scene) * normals if need.shadow or need.ao_samples else visible.points
+    )
     openness: Any = 1.0
     if need.ao_samples:
-        rows, columns = np.divmod(seen.pixels, seen.camera.size[0])
-        turns = turns_at(columns, rows + seen.rows[0])
+        rows, columns = np.divmod(visible.pixels, visible.camera.size[0])
+        turns = turns_at(columns, rows + visible.rows[0])
         openness = _openness(scene, start, normals, turns, need.ao_samples, request.ground)
         counts += Counts(ao_rays=need.ao_samples * len(normals))
     if need.lamp in ("none", "head"):
@@ -168,7 +174,7 @@ def _light(scene: Scene, request: Request, need: Needs, seen: Seen) -> tuple[Flo
         lamp, fill = None if request.sun is None else np.array(request.sun, np.float64), UP
     reached = np.ones(len(normals))
     if need.shadow and lamp is not None:
-        # What is turned away from the lamp is dark already.
+        # Points that face away from the lamp are dark already.
         turned = np.flatnonzero(normals @ lamp > 0)
         reached[turned] = ~scene.blocked(start[turned], np.broadcast_to(lamp, (len(turned), 3)))
         counts += Counts(shadow_rays=len(turned))
@@ -192,19 +198,19 @@ def _openness(scene: Scene, start: Floats, normals: Floats, turns: Floats, sampl
     return result
 
 
-def _ink(scene: Scene, request: Request, seen: Seen) -> Floats:
+def _ink(scene: Scene, request: PictureRequest, visible: VisiblePoints) -> Floats:
     """(rows, W) share of each pixel that ink lines cover."""
-    count = seen.shape[0] * seen.shape[1]
+    count = visible.shape[0] * visible.shape[1]
     kinds = np.zeros(count, np.int16)
-    # The rim of the ground is no line of the figure: ground and nothing are one kind.
-    kinds[seen.pixels[seen.figure]] = seen.surface.labels.astype(np.int16) + 1
+    # The rim of the ground is not a line of the figure, so ground and background have the same label.
+    kinds[visible.pixels[visible.figure]] = visible.surface.labels.astype(np.int16) + 1
     places, ways = np.zeros((count, 3)), np.zeros((count, 3))
-    places[seen.pixels], ways[seen.pixels] = seen.points, seen.normals
+    places[visible.pixels], ways[visible.pixels] = visible.points, visible.normals
     return ink_cover(
-        kinds.reshape(seen.shape),
-        places.reshape(*seen.shape, 3),
-        ways.reshape(*seen.shape, 3),
-        seen.camera.pixel,
+        kinds.reshape(visible.shape),
+        places.reshape(*visible.shape, 3),
+        ways.reshape(*visible.shape, 3),
+        visible.camera.pixel,
         height_of(scene),
         request.outline_px * request.samples,
     )

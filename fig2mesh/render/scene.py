@@ -1,4 +1,4 @@
-"""What is looked at: the part fields of a figure, or a finished mesh; both answer the same three questions."""
+"""Scenes to render: the part fields of a figure, or a finished mesh, with a common interface."""
 
 from __future__ import annotations
 
@@ -26,17 +26,18 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 CLEARANCE = 1e-3
-"""Rays start this share of the figure's height off the surface, so that they do not meet it where they start."""
+"""Distance from the surface at which secondary rays start, so that they do not hit it there; share of the figure's
+height."""
 
 BLEND_SPAN = 0.5
-"""`blend`: over so much of the normal's z the drawing comes in, from the angle at which it would have appeared."""
+"""`blend`: range of the normal's z over which the drawing fades in, above the threshold of `Sources.grazing`."""
 
 
 @dataclass(frozen=True)
-class Surface:
-    """Where N rays meet the surface, at M points; what was not needed has no rows.
+class SurfaceHits:
+    """Hits of N rays on the surface, at M points; arrays that were not needed have no rows.
 
-    depth : (N,) along the rays; infinite where nothing is met
+    depth : (N,) along the rays; infinite where nothing is hit
     points : (M, 3); normals : (M, 3) unit; labels : (M,) uint8
     hits : on the triangles of a mesh; None for fields
     """
@@ -53,20 +54,20 @@ class Scene(Protocol):
 
     @property
     def bounds(self) -> Floats:
-        """(2, 3) box around the surface."""
+        """(2, 3) bounding box of the surface."""
 
     @property
     def unit(self) -> float:
-        """Length of a unit of these coordinates in the units of what was given."""
+        """Length of a unit of these coordinates, in units of the input."""
 
-    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
-        """First meeting with the surface of each ray of a picture's rows, from the first to before the last."""
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
+        """First hits of the rays of a picture's rows, from the first to before the last."""
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
-        """(N,) whether the surface is met within `reach`."""
+        """(N,) whether rays hit the surface within `reach`."""
 
-    def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
-        """(M, 3) sRGB 0-255 of the points of a surface."""
+    def colours(self, surface: SurfaceHits, needs: Needs) -> tuple[Floats, Counts]:
+        """(M, 3) sRGB 0-255 of the points."""
 
 
 def height_of(scene: Scene) -> float:
@@ -94,7 +95,7 @@ class FieldScene:
     def unit(self) -> float:
         return 1.0
 
-    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         frame = render_frame(self.body, camera, rows, with_parts=needs.labels, with_normals=needs.normals)
         depth = frame.depth.reshape(-1)
         hit = np.flatnonzero(np.isfinite(depth))
@@ -107,16 +108,16 @@ class FieldScene:
         if frame.parts is not None:
             labels = self.body.labels[frame.parts.reshape(-1)[hit]]
         counts = Counts(camera_rays=len(depth), normals=frame.normals_computed)
-        return Surface(depth, points, normals, labels), counts
+        return SurfaceHits(depth, points, normals, labels), counts
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         rays = Rays(origins.astype(np.float32), directions.astype(np.float32))
         return np.asarray(trace(self.body, rays, with_normals=False).depth < reach)
 
-    def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
+    def colours(self, surface: SurfaceHits, needs: Needs) -> tuple[Floats, Counts]:
         if self.sources is None or self.frame is None:
             raise ValueError("sources and frame: None, expected the colours of the figure")
-        # The drawing is seen from far along +z, as in the bake; there the mesh decides, here the field itself.
+        # The viewer of the drawing is far along +z, as in the bake; there the mesh decides visibility, here the field.
         facing = surface.normals[:, 2]
         share = (facing > self.sources.grazing).astype(np.float64)
         if needs.blend:
@@ -154,7 +155,7 @@ class MeshScene:
     def unit(self) -> float:
         return self._caster.unit
 
-    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[Surface, Counts]:
+    def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         rays = camera.rays(rows)
         hits = self._caster.cast(rays.origins, rays.directions)
         points, normals, labels = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.uint8)
@@ -166,12 +167,12 @@ class MeshScene:
             nearest = hits.corners[np.arange(len(hits.corners)), hits.weights.argmax(axis=1)]
             labels = np.zeros(len(nearest), np.uint8) if self.mesh.parts is None else self.mesh.parts[nearest]
         counts = Counts(camera_rays=len(hits.depth), normals=len(normals))
-        return Surface(hits.depth, points, normals, labels, hits), counts
+        return SurfaceHits(hits.depth, points, normals, labels, hits), counts
 
     def blocked(self, origins: Floats, directions: Floats, reach: float = np.inf) -> Bools:
         return self._caster.blocked(origins, directions, reach)
 
-    def colours(self, surface: Surface, needs: Needs) -> tuple[Floats, Counts]:
+    def colours(self, surface: SurfaceHits, needs: Needs) -> tuple[Floats, Counts]:
         assert surface.hits is not None
         found = self._caster.colours(surface.hits)
         if found is None:

@@ -1,4 +1,4 @@
-"""Where the sun stands, and from which side it lights a figure."""
+"""Position of the sun, and direction of its light on a figure."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from fig2mesh.errors import InputError
 
 @dataclass(frozen=True)
 class Sun:
-    """azimuth_deg : compass bearing of the sun; elevation_deg : above the horizon, as seen through the air."""
+    """azimuth_deg : compass bearing of the sun; elevation_deg : above the horizon, with refraction."""
 
     azimuth_deg: float
     elevation_deg: float
 
     @property
     def up(self) -> bool:
-        """Whether its middle is above the horizon."""
+        """Whether its centre is above the horizon."""
         return self.elevation_deg > 0.0
 
 
 def parse_time(text: str, source: str = "--time") -> datetime:
-    """A moment in UTC of an ISO 8601 text. Raises InputError for others, and without an offset from UTC."""
+    """Parse an ISO 8601 time to UTC. Raises InputError for invalid times, and for times without a UTC offset."""
     try:
         time = datetime.fromisoformat(text.strip())
     except ValueError:
-        raise InputError(source, f"{text!r} is no ISO 8601 time", "write 2026-06-21T14:00+02:00") from None
+        raise InputError(source, f"{text!r} is not an ISO 8601 time", "write 2026-06-21T14:00+02:00") from None
     if time.utcoffset() is None:
-        raise InputError(source, f"{text!r} does not say in which zone", "end it with Z or with +02:00")
+        raise InputError(source, f"{text!r} has no time zone", "end it with Z or with an offset such as +02:00")
     try:
         return time.astimezone(UTC)
     except OverflowError:
@@ -37,9 +37,9 @@ def parse_time(text: str, source: str = "--time") -> datetime:
 
 
 def sun_at(lon_deg: float, lat_deg: float, time: datetime) -> Sun:
-    """The sun over a place on WGS 84 at a moment in UTC.
+    """Position of the sun at a place on WGS 84 and a time in UTC.
 
-    With `astral`, after the NOAA solar calculator (Meeus): within 0.01 degrees of NREL's SPA from 1900 to 2100, and
+    By `astral`, after the NOAA solar calculator (Meeus): within 0.01 degrees of NREL's SPA from 1900 to 2100, and
     0.2 degrees at the very poles.
     """
     from astral import Observer

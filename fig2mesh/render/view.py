@@ -1,4 +1,4 @@
-"""Where the camera stands: one place for all pictures of a turntable."""
+"""Position of the camera, the same for all pictures of a turntable."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from fig2mesh.field.camera import Camera, axes
 
 MARGIN = 0.05
-"""Free border on each side, share of the picture."""
+"""Empty border on each side, share of the picture."""
 
 NEARBY = 2.2
-"""The camera of `perspective` stands so many figures away: a man at four metres, the field of view 30 degrees."""
+"""Distance of the camera of `perspective`, in heights of the figure: a man at four metres, field of view 30 degrees."""
 
 GROUND_RADIUS = 0.36
-"""Of the ground's disc, share of the figure's height; or as far as the figure reaches, and a tenth more."""
+"""Radius of the ground's disc, share of the figure's height; at least 1.1 times the extent of the figure."""
 
 
 @dataclass(frozen=True)
-class View:
-    """A camera that turns about the vertical axis through the middle of a figure, which never leaves the picture.
+class CameraView:
+    """A camera that turns about the vertical axis through the centre of a figure, which never leaves the picture.
 
     near, far : distances from the camera's plane between which the figure lies
     """
@@ -33,24 +33,24 @@ class View:
 
 
 def ground_radius(bounds: NDArray[np.float64]) -> float:
-    """Of the disc that a figure with these bounds (2, 3) stands on."""
+    """Radius of the disc under a figure with these bounds (2, 3)."""
     half = (bounds[1] - bounds[0]) / 2
     return float(max(GROUND_RADIUS * 2 * half[1], 1.1 * np.hypot(half[0], half[2])))
 
 
 def make_view(
     bounds: Any, size: tuple[int, int], yaw_deg: float, pitch_deg: float, *, nearby: bool, ground: bool
-) -> View:
-    """The camera for a figure in a box (2, 3); all but its direction is the same for every yaw.
+) -> CameraView:
+    """Camera for a figure in a box (2, 3); only its direction depends on the yaw.
 
-    nearby : perspective; ground : show the disc below it as well
+    nearby : perspective; ground : also show the disc below it
     """
     box = np.asarray(bounds, np.float64)
     half = (box[1] - box[0]) / 2
     radius = float(np.hypot(half[0], half[2]))
     if ground:
         radius = max(radius, ground_radius(box))
-    # The upright cylinder around all that can come into the picture: its two rims, as they look from this pitch.
+    # The upright cylinder around everything that can be visible: its two rims, from this pitch.
     angle = np.linspace(0.0, 2 * np.pi, 181)
     rim = np.stack([radius * np.cos(angle), 0 * angle, radius * np.sin(angle)], axis=1)
     figure = float(np.hypot(half[0], half[2])) / radius
@@ -65,4 +65,4 @@ def make_view(
     shown = 2 * max(float(np.abs(up).max()), float(np.abs(across).max()) * height / width) / (1 - 2 * MARGIN)
     reach = float(towards.max())
     camera = Camera(yaw_deg, pitch_deg, size, shown, box.mean(axis=0), distance, nearby)
-    return View(camera, distance - reach, distance + reach)
+    return CameraView(camera, distance - reach, distance + reach)

@@ -1,1 +1,1 @@
-"""What accuracy costs: every knob of the main job swept on a figure, error against seconds and memory."""
+"""Cost of accuracy: every setting of the pipeline varied on a figure, error against seconds and memory."""

@@ -1,4 +1,4 @@
-"""`fig2mesh tradeoff`: the sweep of each figure, and the files that it leaves."""
+"""`fig2mesh tradeoff`: sweep each figure and write the results."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from fig2mesh.field.body import Body
 from fig2mesh.parse.read import read_figure
 from fig2mesh.settings import PRESETS
 
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 
 PAGE = "README.md"
-"""It names the other files, and so is put in place last."""
+"""Put in place last, because it refers to the other files."""
 
 
 def drawings_of(figures: Sequence[Path], keypoints: Path | None, mask: Path | None) -> list[Drawing]:
-    """The files of folders with image.png, keypoints.json and perhaps mask.png, or of one picture."""
+    """Drawings in folders with image.png, keypoints.json and optionally mask.png, or the drawing of one picture."""
     if (keypoints or mask) and (len(figures) != 1 or figures[0].is_dir()):
-        raise InputError("--keypoints", "given for several figures or a folder", "give one picture, or folders alone")
+        raise InputError("--keypoints", "cannot be combined with several figures or a folder", "give one picture")
     found = []
     for figure in figures:
         if figure.is_dir():
             files = drawing_in(figure)
         else:
             files = Drawing(figure.stem, figure, keypoints or figure.with_name("keypoints.json"), mask)
-        # Bad input is told before minutes of work.
+        # Invalid input is reported before minutes of work.
         read_figure(**files.arguments())
         found.append(files)
     names = [files.name for files in found]
@@ -39,8 +39,8 @@ def drawings_of(figures: Sequence[Path], keypoints: Path | None, mask: Path | No
     return found
 
 
-def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], overwrite: bool, say: Say) -> None:
-    """Sweep all figures; writes tradeoff.csv, README.md and two plots a figure into `folder`, all or nothing."""
+def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], overwrite: bool, log: Log) -> None:
+    """Sweep all figures; writes tradeoff.csv, README.md and two plots per figure to `folder`, all or none."""
     from fig2mesh.tradeoff.measures import measure
     from fig2mesh.tradeoff.report import as_csv, plot, rows, summary
     from fig2mesh.tradeoff.sweep import requests, sweep
@@ -48,7 +48,9 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
 
     sweep_temporary(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())) and not overwrite:
-        raise OutputError(folder, "exists and is not an empty folder", "pass --overwrite or another folder")
+        raise OutputError(
+            folder, "already exists and is not an empty folder", "use --overwrite or choose another folder"
+        )
 
     def fill(stage: Path) -> None:
         table, pages = [], []
@@ -58,12 +60,12 @@ def tradeoff(figures: Sequence[Drawing], folder: Path, knobs: Sequence[str], ove
             finest = None
             for number, run in enumerate(sweep(files.arguments(), knobs), 1):
                 label = f"{run.knob} {run.value}".strip()
-                say(f"{files.name} {number}/{count} {label}: {run.failure or f'{run.total_s:.1f} s'}")
+                log(f"{files.name} {number}/{count} {label}: {run.failure or f'{run.total_s:.1f} s'}")
                 if finest is None:
                     finest = run.mesh
                     if finest is None:
-                        raise InputError(files.name, run.failure, "give a figure that the main job can make")
-                    say(f"{files.name}: errors are measured against this one")
+                        raise InputError(files.name, run.failure, "give a figure that can be converted")
+                    log(f"{files.name}: errors are measured against this one")
                 found.append(measure(run, finest))
             table += rows(files.name, found)
             plot(found, stage, files.name)

@@ -16,10 +16,10 @@ from fig2mesh.tradeoff.sweep import Run
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A run and its errors against the finest; NaN where it made nothing.
+class MeasuredRun:
+    """A run and its errors against the finest run; NaN where it failed.
 
-    chamfer_mm, hausdorff_mm : mean and greatest distance, both ways, of a figure 1.79 m high
+    chamfer_mm, hausdorff_mm : mean and maximum distance, both ways, of a figure 1.79 m high
     normal_deg : mean angle between normals at nearest points, both ways
     """
 
@@ -29,14 +29,14 @@ class Measured:
     normal_deg: float
 
 
-def measure(run: Run, finest: TexturedMesh) -> Measured:
-    """A run against the mesh of the finest."""
+def measure(run: Run, finest: TexturedMesh) -> MeasuredRun:
+    """Measure the errors of a run against the mesh of the finest run."""
     if run.mesh is None:
-        return Measured(run, float("nan"), float("nan"), float("nan"))
+        return MeasuredRun(run, float("nan"), float("nan"), float("nan"))
     made, reference = _solid(run.mesh), _solid(finest)
     mean, worst = deviation(made, reference)
     angle = (normal_angle(made, reference) + normal_angle(reference, made)) / 2
-    return Measured(run, 1000 * mean, 1000 * worst, angle)
+    return MeasuredRun(run, 1000 * mean, 1000 * worst, angle)
 
 
 def normal_angle(mesh: Mesh, target: Mesh) -> float:
@@ -55,12 +55,12 @@ def normal_angle(mesh: Mesh, target: Mesh) -> float:
 
 
 def _solid(mesh: TexturedMesh) -> Mesh:
-    """Copies of a vertex along seams do not matter for distances."""
+    """Surface of a textured mesh; the copies of vertices along seams do not matter for distances."""
     return Mesh(mesh.vertices, mesh.faces)
 
 
 def pareto(costs: Sequence[float], errors: Sequence[float]) -> NDArray[np.int64]:
-    """Indices of the points that no other beats in both, by rising cost; points with NaN are none."""
+    """Indices of the Pareto-optimal points, by rising cost; points with NaN are excluded."""
     order = sorted(range(len(costs)), key=lambda i: (costs[i], errors[i]))
     front: list[int] = []
     for i in order:
@@ -70,9 +70,9 @@ def pareto(costs: Sequence[float], errors: Sequence[float]) -> NDArray[np.int64]
 
 
 def knee(costs: Sequence[float], errors: Sequence[float]) -> int:
-    """Index of the point of a front furthest below the line between its ends, log of cost against error.
+    """Index of the point of a front furthest below the line between its ends, in log of cost against error.
 
-    After Satopaa et al. 2011, *Finding a "kneedle" in a haystack*. The first of a front of one or two points.
+    After Satopaa et al. 2011, *Finding a "kneedle" in a haystack*. 0 for a front of one or two points.
     """
     x, y = np.log(np.asarray(costs, np.float64)), np.asarray(errors, np.float64)
     if len(x) < 3:

@@ -1,4 +1,4 @@
-"""The sweep as CSV, plots and a page."""
+"""Report of a sweep as CSV, plots and a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from fig2mesh.settings import PRESETS
-from fig2mesh.tradeoff.measures import Measured, knee, pareto
+from fig2mesh.tradeoff.measures import MeasuredRun, knee, pareto
 from fig2mesh.tradeoff.sweep import KNOBS, STAGES_OF
 from fig2mesh.tradeoff.tolerance import Tolerance
 
@@ -24,11 +24,11 @@ COLUMNS: Final = (
 
 
 CROWD: Final = 0.15
-"""Natural logarithm of the ratio of errors below which a run is close to the standard preset."""
+"""Threshold of the natural logarithm of the ratio of errors for a run to be close to the standard preset."""
 
 
-def rows(figure: str, found: Sequence[Measured]) -> list[dict[str, Any]]:
-    """A row of the table for each run; numbers that there are none of are left empty."""
+def rows(figure: str, found: Sequence[MeasuredRun]) -> list[dict[str, Any]]:
+    """Rows of the table, one per run; missing numbers are empty."""
     return [
         {
             "figure": figure,
@@ -62,8 +62,8 @@ def as_csv(table: Sequence[dict[str, Any]]) -> str:
     return stream.getvalue()
 
 
-def summary(figure: str, found: Sequence[Measured], tolerances: Sequence[Tolerance], machine: str) -> str:
-    """The page of one figure, Markdown: the knee, the presets, every knob."""
+def summary(figure: str, found: Sequence[MeasuredRun], tolerances: Sequence[Tolerance], machine: str) -> str:
+    """Page of one figure, Markdown: the knee, the presets, every knob."""
     front, best = _front(found)
     named = [_name(found[i]) for i in front]
     chosen = found[front[best]]
@@ -97,9 +97,9 @@ def summary(figure: str, found: Sequence[Measured], tolerances: Sequence[Toleran
     return "\n\n".join(lines) + "\n"
 
 
-def _front(found: Sequence[Measured]) -> tuple[list[int], int]:
-    """Indices of the runs on the Pareto front, and which of them is the knee; models without colours are another
-    product, and the finest has no error by definition."""
+def _front(found: Sequence[MeasuredRun]) -> tuple[list[int], int]:
+    """Indices of the runs on the Pareto front, and which of them is the knee; models without colours are excluded
+    as another product, and the finest because it has no error by definition."""
     rivals = [m.run.knob != "finest" and (m.run.knob, m.run.value) != ("textures", "none") for m in found]
     costs = [m.run.total_s if rival else np.nan for m, rival in zip(found, rivals, strict=True)]
     errors = [m.chamfer_mm for m in found]
@@ -107,13 +107,13 @@ def _front(found: Sequence[Measured]) -> tuple[list[int], int]:
     return front, knee([costs[i] for i in front], [errors[i] for i in front]) if front else 0
 
 
-def _name(measured: Measured) -> str:
+def _name(measured: MeasuredRun) -> str:
     run = measured.run
     return run.value if run.knob in ("", "quality") else f"{run.knob}={run.value}" if run.value else run.knob
 
 
-def plot(found: Sequence[Measured], folder: Path, figure: str) -> None:
-    """Two pictures: error against seconds with the front, and each knob by itself."""
+def plot(found: Sequence[MeasuredRun], folder: Path, figure: str) -> None:
+    """Write two plots: error against seconds with the front, and each knob separately."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -121,7 +121,7 @@ def plot(found: Sequence[Measured], folder: Path, figure: str) -> None:
     _plot_knobs(found, folder / f"{figure}-knobs.png")
 
 
-def _plot_front(found: Sequence[Measured], path: Path) -> None:
+def _plot_front(found: Sequence[MeasuredRun], path: Path) -> None:
     from matplotlib.figure import Figure as Plot
     from matplotlib.ticker import ScalarFormatter
 
@@ -137,7 +137,7 @@ def _plot_front(found: Sequence[Measured], path: Path) -> None:
         axes.scatter(
             m.run.total_s, m.chamfer_mm, s=60 if preset else 18, color="tab:red" if preset else "tab:blue", zorder=2
         )
-        # What lies beside the standard preset would only hide it.
+        # Labels close to the standard preset would only hide it.
         apart = abs(np.log(m.chamfer_mm / standard.chamfer_mm)) > CROWD
         if preset or apart or i in front:
             weight = "bold" if preset or i == front[best] else "normal"
@@ -161,7 +161,7 @@ def _plot_front(found: Sequence[Measured], path: Path) -> None:
     plot.savefig(path, dpi=110)
 
 
-def _plot_knobs(found: Sequence[Measured], path: Path) -> None:
+def _plot_knobs(found: Sequence[MeasuredRun], path: Path) -> None:
     from matplotlib.figure import Figure as Plot
 
     knobs = [knob for knob in KNOBS if any(m.run.knob == knob for m in found) and knob != "quality"]
@@ -191,7 +191,7 @@ def _plot_knobs(found: Sequence[Measured], path: Path) -> None:
 
 
 def _order(value: str) -> tuple[float, str]:
-    """Numbers by size, coarse or small first as they come; words after them."""
+    """Sort key: numbers by size, then words."""
     try:
         return float(value), ""
     except ValueError:

@@ -1,4 +1,4 @@
-"""The knobs, their values, and one run of the pipeline in a process of its own."""
+"""The knobs and their values, and runs of the pipeline in separate processes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fig2mesh.settings import PRESETS, Settings
 from fig2mesh.skeleton import FIGURE_HEIGHT
 
 FINEST: Final = replace(PRESETS["fine"], voxel=0.004, spacing=0.005, triangles=120_000)
-"""What errors are measured against: finer than any value of the sweep, but for the texture, which is as fine."""
+"""Reference of errors: finer than any value of the sweep, except for the texture, which is as fine."""
 
 KNOBS: Final[Mapping[str, tuple[Any, ...]]] = {
     "quality": ("draft", "standard", "fine"),
@@ -31,7 +31,7 @@ KNOBS: Final[Mapping[str, tuple[Any, ...]]] = {
     "texture_size": (512, 2048),
     "textures": ("plain", "none"),
 }
-"""Knob → values beside the standard preset's own; the others stay as in that preset. "quality" is all at once."""
+"""Knob → values other than the standard preset's; the other knobs stay as in that preset. "quality" changes all."""
 
 # fmt: off
 STAGES_OF: Final[Mapping[str, str]] = {
@@ -40,16 +40,16 @@ STAGES_OF: Final[Mapping[str, str]] = {
     "textures": "textures",
 }
 # fmt: on
-"""Knob → the stage that it is about."""
+"""Knob → the stage that it affects."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A request and what came of it.
+    """A run of the pipeline and its result.
 
     knob, value : what differs from the standard preset; "" for that preset itself
     seconds : by stage; peak_mb : largest resident size of the process
-    mesh : the model; None where the run failed, and `failure` says why
+    mesh : the model; None where the run failed, for the reason in `failure`
     """
 
     knob: str
@@ -81,7 +81,7 @@ def requests(knobs: Sequence[str]) -> Iterator[tuple[str, str, Settings]]:
 
 
 def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
-    """One run of the pipeline, timed; a fault of the figure is kept, not raised."""
+    """Run the pipeline and time it; a FigureError is stored, not raised."""
     from fig2mesh.asset_frame import asset_from_figure, on_drawing
     from fig2mesh.conversion.convert import run_stages
     from fig2mesh.conversion.observer import Observer, peak_mb
@@ -110,7 +110,7 @@ def run(figure: Figure, knob: str, value: str, settings: Settings) -> Run:
 
 
 def sweep(paths: Mapping[str, Path | None], knobs: Sequence[str]) -> Iterator[Run]:
-    """Every run in a fresh process, one at a time, so that no run profits from what another left in memory.
+    """Yield every run, each in a fresh process, one at a time, so that no run profits from the caches of another.
 
     paths : keyword arguments of `read_figure`, the picture as "path"
     """
@@ -132,7 +132,7 @@ def _in_process(paths: dict[str, Any], knob: str, value: str, settings: Settings
 
 
 def warm_up() -> None:
-    """Load compiled kernels and libraries: what every run pays alike is not what is measured."""
+    """Load compiled kernels and libraries, whose cost is the same for every run and not measured."""
     import open3d
     import torch
 

@@ -1,4 +1,4 @@
-"""What the tracer's tolerance costs: depth errors, cells looked at, seconds."""
+"""Cost of the tracer's tolerance: depth errors, cells visited, seconds."""
 
 from __future__ import annotations
 
@@ -20,8 +20,12 @@ SIZE: Final = 512
 
 @dataclass(frozen=True)
 class Tolerance:
-    """tolerance : FIGURE units, which are metres for a figure 1.79 m high; errors of depth over all rays that hit
-    with both; steps : cells a ray; seconds : of the four views"""
+    """Errors and costs of one tolerance.
+
+    tolerance : FIGURE units, which are metres for a figure 1.79 m high
+    mean_mm, worst_mm : errors of depth over all rays that hit with both tolerances
+    steps : cells per ray; seconds : for the four views
+    """
 
     tolerance: float
     mean_mm: float
@@ -31,7 +35,7 @@ class Tolerance:
 
 
 def tolerances(body: Body) -> tuple[Tolerance, ...]:
-    """The four views of a body at every tolerance."""
+    """Measure the four views of a body at every tolerance."""
     views = [_rays(body, yaw) for yaw in VIEW_YAW_DEG.values()]
     exact = [trace(body, rays, tolerance=EXACT, with_normals=False).depth for rays in views]
     result = []

@@ -1,1 +1,1 @@
-"""`fig2mesh view`: a figure's part fields, sphere traced by a browser (paper §4.5)."""
+"""`fig2mesh view`: sphere tracing of a figure's part fields in a browser (paper §4.5)."""

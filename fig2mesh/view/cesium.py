@@ -1,4 +1,4 @@
-"""Where CesiumJS is on this machine."""
+"""Location of CesiumJS on this machine."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from pathlib import Path
 from fig2mesh.errors import InputError
 
 CESIUM = "cesium"
-"""Where a page finds CesiumJS, relative to its own address."""
+"""URL of CesiumJS, relative to the page."""
 
 
 def find_cesium(folder: Path | None, option: str) -> Path:
-    """The folder of CesiumJS as built for pages, in the npm package that was named, or that npm put beside us.
+    """Find the built CesiumJS in the npm package that was named, or in node_modules.
 
-    folder : the package or its folder Build/Cesium; None: node_modules/cesium in this folder or one above
-    option : what needs it, for the message where there is none
+    folder : the package or its folder Build/Cesium; None: node_modules/cesium in the current folder or a parent
+    option : that needs it, for the error message
 
-    Raises InputError where there is none.
+    Raises InputError if there is none.
     """
     here = Path.cwd()
     tried = [folder] if folder is not None else [up / "node_modules" / "cesium" for up in (here, *here.parents)]
@@ -25,4 +25,4 @@ def find_cesium(folder: Path | None, option: str) -> Path:
             if (built / "Cesium.js").is_file():
                 return built
     found = f"no CesiumJS in {folder}" if folder is not None else "no CesiumJS in node_modules"
-    raise InputError(option if folder is None else "--cesium", found, "npm install cesium, or pass --cesium DIR")
+    raise InputError(option if folder is None else "--cesium", found, "run npm install cesium, or give --cesium DIR")

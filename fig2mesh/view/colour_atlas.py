@@ -1,4 +1,4 @@
-"""Colours as one picture: the drawing, the plain pictures of unseen sides, and how far the drawing's viewer sees."""
+"""Colours in one picture: the drawing and the plain pictures of unseen sides; and a depth map of the front."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from fig2mesh.image_frame import ImageFrame
 from fig2mesh.records import ByteArray, FloatArray
 from fig2mesh.texture.sources import Sources
 
-MOST_PX: Final = 1280
+MAX_PX: Final = 1280
 """Longest side of the drawing on a page."""
 
 GAP_PX: Final = 8
-"""Between a picture's edge and what it colours, so that coarser mipmaps take nothing from beside it."""
+"""Margin of a picture round the part that is used, so that coarser mipmaps do not mix in its neighbours."""
 
 DEPTH_PX: Final = 768
-"""Longest side of the depth map: two pixels or so for each node of a part's grid."""
+"""Longest side of the depth map: about two pixels per node of a part's grid."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Slot:
     """One picture in the atlas.
 
     place : (ax, bx, ay, by), atlas texel = (ax x + bx, ay y + by) of a point (x, y) in FIGURE
-    window : (x0, y0, x1, y1), texels of the picture; colours beyond are those of its rim
+    window : (x0, y0, x1, y1), texels of the picture; colours are clamped to it
     """
 
     place: tuple[float, float, float, float]
@@ -40,8 +40,11 @@ class Slot:
 
 @dataclass(frozen=True)
 class ColourAtlas:
-    """picture : (H, W, 3) uint8 sRGB; slots : the drawing first; slot_of_label : part label → slot of its unseen side;
-    default : slot of other labels."""
+    """Atlas of colours.
+
+    picture : (H, W, 3) uint8 sRGB; slots : the drawing first
+    slot_of_label : part label → slot of its unseen side; default : slot of other labels
+    """
 
     picture: ByteArray
     slots: tuple[Slot, ...]
@@ -51,7 +54,7 @@ class ColourAtlas:
 
 @dataclass(frozen=True)
 class DepthMap:
-    """z : (h, w) float16 FIGURE, how near to the viewer the surface comes; -1000 where there is none.
+    """z : (h, w) float16 FIGURE, of the front surface; -1000 where there is none.
 
     place : (ax, bx, ay, by) as for `Slot`
     """
@@ -64,7 +67,7 @@ NOTHING: Final = -1000.0
 
 
 def colour_atlas(sources: Sources, frame: ImageFrame, body: Body) -> ColourAtlas:
-    """The drawing and each different plain picture side by side, cut to what they colour."""
+    """Pack the drawing and each distinct plain picture into an atlas, cropped to the parts that are used."""
     crops = [_crop(_bytes(sources.seen), 1.0, frame, body.bounds())]
     boxes, labels = body.grids.boxes, body.labels[body.grids.owners]
     slot_of_label: dict[int, int] = {}
@@ -102,7 +105,7 @@ def _bytes(picture: FloatArray) -> ByteArray:
 def _crop(
     picture: ByteArray, scale: float, frame: ImageFrame, bounds: NDArray[Any]
 ) -> tuple[ByteArray, tuple[float, float, float, float]]:
-    """The part of a picture that lies before `bounds` (2, 3) in FIGURE, small enough for a page, and its place.
+    """Crop a picture to `bounds` (2, 3) in FIGURE, reduced to the size for a page; return it and its place.
 
     scale : pixels of `picture` for each IMAGE pixel
     """
@@ -111,7 +114,7 @@ def _crop(
     first = np.clip(np.floor(corners[0]).astype(int) - GAP_PX, 0, size - 1)
     last = np.clip(np.ceil(corners[1]).astype(int) + GAP_PX, first + 1, size)
     cut = picture[first[1] : last[1], first[0] : last[0]]
-    factor = max(1.0, max(cut.shape[:2]) / MOST_PX)
+    factor = max(1.0, max(cut.shape[:2]) / MAX_PX)
     columns, rows = (max(1, round(n / factor)) for n in (cut.shape[1], cut.shape[0]))
     image = Image.fromarray(cut)
     if factor > 1:
@@ -124,10 +127,10 @@ def _crop(
 
 
 def depth_map(body: Body) -> DepthMap:
-    """What the drawing's viewer, far away along +z, sees first of the parts.
+    """Depth of the first surface of the parts from the drawing's viewer, far away along +z.
 
-    Not of the fillets, so that one map serves pages that trace them and pages that do not: a fillet's own points lie
-    before it, and what it hides nobody sees.
+    Fillets are left out, so that one map serves pages that trace them and pages that do not: points of a fillet lie in
+    front of it, and points behind a fillet are hidden.
     """
     body = Body(body.parts)
     low, high = body.bounds().astype(np.float64)

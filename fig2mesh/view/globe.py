@@ -1,4 +1,4 @@
-"""The page of a scene on a globe: the same shader, its picture a billboard in CesiumJS (paper §4.5)."""
+"""HTML page of a scene on a globe: rendered by the same shader, to a billboard in CesiumJS (paper §4.5)."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import json
 from collections.abc import Collection
 
 from fig2mesh.view.page import figure_json
-from fig2mesh.view.scene import Scene
+from fig2mesh.view.scene import ViewScene
 from fig2mesh.view.template import asset, filled
 from georef.placement import GeoPlacement
 
 
-def globe_page(scene: Scene, placement: GeoPlacement, cesium: str, effects: Collection[str] | None = None) -> str:
-    """The page of a figure that stands on the globe.
+def globe_page(scene: ViewScene, placement: GeoPlacement, cesium: str, effects: Collection[str] | None = None) -> str:
+    """HTML page of a figure on a globe.
 
-    cesium : address of CesiumJS as built for pages, with a slash at its end; absolute or relative to the page
-    effects : that are on; None: `fig2mesh.view.page.default_effects`
+    cesium : URL of the built CesiumJS, with a slash at its end; absolute or relative to the page
+    effects : enabled effects; None: `fig2mesh.view.page.default_effects`
     """
     place = {
         "lon_deg": placement.lon_deg,

@@ -1,4 +1,4 @@
-"""`fig2mesh view`: read a drawing, make its page, show or write it. All side effects are here."""
+"""`fig2mesh view`: read a drawing, make its page, serve or write it. All side effects are here."""
 
 from __future__ import annotations
 
@@ -22,30 +22,30 @@ from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.globe import globe_page
 from fig2mesh.view.page import EFFECTS, view_page
 from fig2mesh.view.request import ViewRequest
-from fig2mesh.view.scene import Scene, make_scene
+from fig2mesh.view.scene import ViewScene, make_scene
 from fig2mesh.view.server import page_server, show
 
 log = logging.getLogger("fig2mesh")
 
 
 def run(request: ViewRequest, quiet: bool = False) -> None:
-    """Do what `fig2mesh view` asks for; quiet : without progress."""
+    """Run `fig2mesh view`; quiet : without progress."""
     sheet = open_map(request)
     wanted = None if request.effects is None else _effects(request.effects)
     _check(request)
-    shown = request.somewhere and request.output is None
+    shown = request.has_place and request.output is None
     folders = {CESIUM: find_cesium(request.cesium, "--lonlat")} if shown else {}
     drawn = read_figure(**request.reading())
     settings = request.settings()
     placed = place(request, sheet, drawn, request.figure)
     log_place(placed)
     if request.output is None:
-        page_server("", request.port).server_close()  # a port that is taken is reported before the work
+        page_server("", request.port).server_close()  # report a port in use before the work
     with progress(quiet) as advance:
         scene = scene_of(drawn, settings, placed.height_m, advance)
         advance("page")
-        there = placed.placement
-        page = view_page(scene, wanted) if there is None else globe_page(scene, there, f"{CESIUM}/", wanted)
+        at = placed.placement
+        page = view_page(scene, wanted) if at is None else globe_page(scene, at, f"{CESIUM}/", wanted)
     if request.output is not None:
         write_text(request.output, page, "-o")
         log.info("%s: %.1f MB", request.output, len(page) / 1e6)
@@ -55,8 +55,8 @@ def run(request: ViewRequest, quiet: bool = False) -> None:
 
 def scene_of(
     figure: Figure, settings: Settings, height_m: float, advance: Callable[[str], object] = lambda name: None
-) -> Scene:
-    """The scene of a figure, by those stages that it needs; advance : told the name of each."""
+) -> ViewScene:
+    """Make the scene of a figure, with only the stages that it needs; advance : called with the name of each."""
     done = run_stages(figure, settings, (lift, body, textures), height_m=height_m, observer=Observer(advance))
     fields, sources, pose = done.results[body], done.results[textures], done.results[lift]
     contours = settings.contours == "keep"
@@ -66,18 +66,18 @@ def scene_of(
 def _check(request: ViewRequest) -> None:
     output = request.output
     if request.textures == "none":
-        raise InputError("--textures", "none, but the page shows them", "use network or plain")
+        raise InputError("--textures", "view requires textures, not none", "use network or plain")
     if output is not None:
         if output.suffix.lower() not in (".html", ".htm"):
-            raise OutputError(output, "is no name for a page", "give -o a name that ends in .html")
+            raise OutputError(output, "unknown suffix", "give -o a name that ends in .html")
         check_text(output, request.overwrite, "-o")
-    if request.cesium is not None and (not request.somewhere or output is not None):
-        raise InputError("--cesium", "only a globe that is shown needs it", "pass --lonlat and no -o, or leave it out")
+    if request.cesium is not None and (not request.has_place or output is not None):
+        raise InputError("--cesium", "requires --lonlat or --map, without -o", "leave it out")
 
 
 def _effects(text: str) -> tuple[str, ...]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:
         if name not in EFFECTS:
-            raise InputError("--effects", f"{name!r} is no effect", f"choose from {', '.join(EFFECTS)}")
+            raise InputError("--effects", f"unknown effect {name!r}", f"choose from {', '.join(EFFECTS)}")
     return tuple(names)

@@ -1,4 +1,4 @@
-"""The page of a scene: one HTML text that needs nothing from elsewhere."""
+"""HTML page of a scene: one self-contained text."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from typing import Any, Final
 
 from PIL import Image
 
-from fig2mesh.view.scene import LINE_COLOUR, LINE_WIDTH, Scene
+from fig2mesh.view.scene import LINE_COLOUR, LINE_WIDTH, ViewScene
 from fig2mesh.view.template import asset, filled
 
 EFFECTS: Final = {
     "texture": "colours of the drawing",
-    "blend": "drawing and plain colours pass into each other, instead of at a border",
-    "creases": "ink where limbs touch, if the drawing has contours",
+    "blend": "gradual transition between drawing and plain colours, instead of a hard border",
+    "creases": "ink lines where limbs touch, if the drawing has contours",
     "light": "a lamp to the upper left of the viewer",
     "ao": "ambient occlusion",
     "outline": "an ink line along silhouettes",
-    "smooth-union": "parts of a limb melt together",
-    "perspective": "a camera nearby instead of one far away",
-    "antialias": "four rays a pixel",
+    "smooth-union": "rounded joints between parts of a limb",
+    "perspective": "perspective instead of orthographic projection",
+    "antialias": "four rays per pixel",
 }
-"""Effect → what it adds. In capitals these are the names of #defines in the shader."""
+"""Effect → what it adds. In upper case the names are #defines in the shader."""
 
 
-def view_page(scene: Scene, effects: Collection[str] | None = None) -> str:
-    """The stand-alone page of a scene, to be turned and looked at in any browser with WebGL 2.
+def view_page(scene: ViewScene, effects: Collection[str] | None = None) -> str:
+    """Stand-alone HTML page that shows a scene, for any browser with WebGL 2.
 
-    effects : that are on at first; None: `default_effects`
+    effects : initially enabled; None: `default_effects`
     """
     return filled(
         "page.html",
@@ -46,14 +46,14 @@ def view_page(scene: Scene, effects: Collection[str] | None = None) -> str:
     )
 
 
-def default_effects(scene: Scene) -> tuple[str, ...]:
-    """What a page shows at first. Drawings that keep their own contours need no outline."""
+def default_effects(scene: ViewScene) -> tuple[str, ...]:
+    """Initially enabled effects of a page. Drawings that keep their contours need no outline."""
     off = {"perspective", "outline"} if scene.contours else {"perspective"}
     return tuple(effect for effect in EFFECTS if effect not in off)
 
 
-def figure_json(scene: Scene, effects: Collection[str] | None = None) -> str:
-    """The scene as JSON, textures in base64; safe inside of a script element."""
+def figure_json(scene: ViewScene, effects: Collection[str] | None = None) -> str:
+    """Scene as JSON, with textures in base64; safe inside of a script element."""
     field, colours, depth = scene.field, scene.colours, scene.depth
     picture, kind = _encoded(scene)
     brick_of = {brick.owners[0]: i for i, brick in enumerate(field.bricks) if brick.owners[0] == brick.owners[1]}
@@ -93,15 +93,15 @@ def figure_json(scene: Scene, effects: Collection[str] | None = None) -> str:
     return json.dumps(facts, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 
-def _encoded(scene: Scene) -> tuple[bytes, str]:
-    """The colour atlas as a lossless file, and its media type."""
+def _encoded(scene: ViewScene) -> tuple[bytes, str]:
+    """Colour atlas as a lossless image file, and its media type."""
     stream = io.BytesIO()
     Image.fromarray(scene.colours.picture).save(stream, "WEBP", lossless=True, quality=60)
     return stream.getvalue(), "image/webp"
 
 
 def _planes(values: bytes) -> bytes:
-    """16-bit numbers as a zlib stream, low bytes before high ones: either kind is more like its neighbours."""
+    """Compress 16-bit numbers with zlib, all low bytes before all high bytes, which compresses better."""
     return zlib.compress(values[0::2] + values[1::2], 9)
 
 

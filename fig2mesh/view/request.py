@@ -10,25 +10,25 @@ from fig2mesh.conversion.request import FigureFiles, InferenceOptions, PlaceRequ
 
 @request_class
 class ViewRequest(FigureFiles, PlaceRequest, InferenceOptions):
-    """A figure, and how a browser shows it."""
+    """A figure, and options for showing it in a browser."""
 
     output: Path | None = option(
-        default=None, short="o", metavar="PAGE.html", help="Write the page there instead of showing it."
+        default=None, short="o", metavar="PAGE.html", help="Write the page to this file instead of showing it."
     )
     effects: str | None = option(
         default=None,
         metavar="NAME,NAME…",
-        help="What is on at first: texture, blend, creases, light, ao, outline, smooth-union, perspective, antialias. "
-        "Default: all but perspective, and outline only where the drawing's own is not there.",
+        help="Initially enabled effects: texture, blend, creases, light, ao, outline, smooth-union, perspective, "
+        "antialias. Default: all except perspective, and outline only if the drawing has no contours of its own.",
     )
     cesium: Path | None = option(
         default=None,
         metavar="DIR",
-        help="The npm package cesium; default: node_modules/cesium in this folder or one above. A page written with "
-        "-o loads CesiumJS from the folder cesium beside it.",
+        help="Folder of the npm package cesium. Default: node_modules/cesium in the current folder or a parent. A page "
+        "written with -o loads CesiumJS from a folder cesium next to it.",
     )
     port: int = option(
-        default=0, low=0, high=65535, metavar="N", default_text="a free one", help="Of the page's server."
+        default=0, low=0, high=65535, metavar="N", default_text="a free one", help="Port of the local web server."
     )
     open: bool = option(default=True, help="Open the page in a browser.")
     overwrite: bool = option(default=False, help="Replace an existing page.")

@@ -1,4 +1,4 @@
-"""Everything a page shows of one figure."""
+"""Contents of the page of one figure."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from fig2mesh.view.field_atlas import FieldAtlas, field_atlas
 
 LINE_COLOUR = (32.0, 30.0, 32.0)
 LINE_WIDTH = 0.009
-"""Of outlines where the drawing has none to go by, FIGURE units."""
+"""Width of outlines if the drawing has no contours, FIGURE units."""
 
 
 @dataclass(frozen=True)
-class Scene:
+class ViewScene:
     """A figure as textures and numbers.
 
-    slots : for each brick the slot of `colours` that its unseen sides have
+    slots : for each brick, the slot of `colours` for its unseen sides
     pen : colour 0-255 and width in FIGURE units of the drawing's contours; None where it has none
-    grazing : least z of a normal that the drawing colours
-    contours : whether the drawing's own silhouette line lies on the surface
+    grazing : minimum z of a normal that the drawing colours
+    contours : whether the drawing's own contours are on the surface
     bounds : (2, 3) FIGURE; feet : (3,) FIGURE, on the ground between the feet
     metres_per_unit : of the figure on the globe
     """
@@ -47,8 +47,8 @@ class Scene:
 
 def make_scene(
     name: str, body: Body, sources: Sources, frame: ImageFrame, pose: Pose3D, height_m: float, contours: bool = True
-) -> Scene:
-    """The scene of a figure that is `height_m` high and of which the pipeline has made `body` and `sources`."""
+) -> ViewScene:
+    """Make the scene of a figure `height_m` high, from the stage results `body` and `sources`."""
     field, bounds = field_atlas(body), body.bounds()
     colours = colour_atlas(sources, frame, body)
     asset = asset_from_figure(pose, bounds, height_m)
@@ -56,7 +56,7 @@ def make_scene(
     pen = None
     if sources.pen is not None:
         pen = (tuple(float(c) for c in sources.pen.colour), float(sources.pen.width))
-    return Scene(
+    return ViewScene(
         name=name,
         field=field,
         colours=colours,

@@ -1,4 +1,4 @@
-"""A server for one page, for this machine alone."""
+"""Local server for one page."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TYPES = {
     ".svg": "image/svg+xml", ".wasm": "application/wasm", ".webp": "image/webp", ".xml": "application/xml",
 }
 # fmt: on
-"""Media types by suffix; not the system's, which on some Windows machines calls scripts plain text."""
+"""Media types by suffix; not the system's, which on some Windows machines has text/plain for scripts."""
 
 UNKNOWN = "application/octet-stream"
 
@@ -32,17 +32,17 @@ UNKNOWN = "application/octet-stream"
 def page_server(
     page: str, port: int = 0, folders: dict[str, Path] | None = None, files: dict[str, Path] | None = None
 ) -> ThreadingHTTPServer:
-    """A server bound to the loopback address that answers / with the page; `serve_forever()` starts it.
+    """Make a server on the loopback address that serves the page at /; `serve_forever()` starts it.
 
-    port : 0 takes a free one
-    folders : first part of an address → folder whose files lie below it
-    files : whole address, without a slash at its start → file
+    port : 0 for a free one
+    folders : first component of a URL path → folder to serve below it
+    files : whole URL path, without leading slash → file
     """
     single = files or {}
     body = page.encode("utf-8")
     shared = {name: folder.resolve() for name, folder in (folders or {}).items()}
 
-    class Handler(BaseHTTPRequestHandler):
+    class PageHandler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             address = unquote(urlsplit(self.path).path)
             if address in ("/", "/index.html"):
@@ -54,7 +54,7 @@ def page_server(
                 return
             name, _, rest = plain.partition("/")
             path = (shared[name] / rest).resolve() if name in shared and "\0" not in rest else None
-            # Links and dots lead nowhere outside of the folder.
+            # Links and dots must not lead outside of the folder.
             if path is None or not path.is_relative_to(shared[name]) or not path.is_file():
                 self.send_error(HTTPStatus.NOT_FOUND)
                 return
@@ -69,32 +69,32 @@ def page_server(
             self.wfile.write(content)
 
         def log_message(self, format: str, *args: object) -> None:
-            """Nothing: the terminal shows the address and no more."""
+            """Log nothing: the terminal shows only the address."""
 
     try:
-        return ThreadingHTTPServer(("127.0.0.1", port), Handler)
+        return ThreadingHTTPServer(("127.0.0.1", port), PageHandler)
     except OSError as error:
-        remedy = "choose another one, or leave it out"
+        remedy = "choose another port, or leave it out"
         raise InputError("--port", f"{port} cannot be used ({error.strerror})", remedy) from None
 
 
 def address_of(server: ThreadingHTTPServer) -> str:
-    """What to open in a browser."""
+    """URL of the page."""
     return f"http://127.0.0.1:{server.server_address[1]}/"
 
 
 def show(server: ThreadingHTTPServer, open_: bool) -> None:
-    """Print the server's address and answer until Ctrl-C.
+    """Print the server's URL and serve until Ctrl-C.
 
-    open_ : whether to open a browser there
+    open_ : whether to open it in a browser
     """
     with server:
         address = address_of(server)
         click.echo(address)
-        log.info("Ctrl-C ends it")
+        log.info("stop with Ctrl-C")
         if open_:
             webbrowser.open(address)
         try:
             server.serve_forever()
         except KeyboardInterrupt:
-            log.info("ended")
+            log.info("stopped")

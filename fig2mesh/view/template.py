@@ -1,4 +1,4 @@
-"""Pages from templates that lie beside the code."""
+"""Templates of pages, stored next to the code."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from importlib.resources import files
 
 
 def asset(name: str, package: str = "fig2mesh.view") -> str:
-    """The text of a file that lies in a package."""
+    """Text of a file in a package."""
     return files(package).joinpath(name).read_text(encoding="utf-8")
 
 
 def filled(template: str, values: Mapping[str, str], package: str = "fig2mesh.view") -> str:
-    """The template with each {{name}} replaced; what is put in is not looked at again."""
+    """Fill a template: replace each {{name}}, without expanding the values again."""
     pieces = asset(template, package).split("{{")
     text = [pieces[0]]
     for piece in pieces[1:]:

@@ -17,7 +17,7 @@ from fig2mesh.parse.read import read_figure
 from fig2mesh.render.effects import Effect, Mode
 from fig2mesh.render.frame import render_frame
 from fig2mesh.render.job import field_scene
-from fig2mesh.render.picture import Request, render, view_of
+from fig2mesh.render.picture import PictureRequest, render, view_of
 from fig2mesh.render.scene import FieldScene
 from fig2mesh.settings import PRESETS
 
@@ -76,8 +76,8 @@ def table(scene: FieldScene, smooth: FieldScene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def request(mode: Mode, *effects: Effect) -> Request:
-    return Request(mode, frozenset(effects), SIZE, sun=(0.5, 0.7, 0.5))
+def request(mode: Mode, *effects: Effect) -> PictureRequest:
+    return PictureRequest(mode, frozenset(effects), SIZE, sun=(0.5, 0.7, 0.5))
 
 
 def ratio(job: Callable[[], object], plain: Callable[[], object]) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.field.body import Body
-from fig2mesh.measure.front import flange_share, look
+from fig2mesh.measure.front import flange_share, front_view
 from fig2mesh.measure.solid import inner_shells
 from fig2mesh.mesh.topology import check_solid
 from fig2mesh.skeleton import JOINT, PART, PART_NAMES
@@ -208,7 +208,7 @@ def test_front_silhouette_is_the_drawing(drawing: Callable[[], Assembled]) -> No
 def test_nothing_is_a_plate(drawing: Callable[[], Assembled]) -> None:
     """No drawing here shows a sheet; one in two hundred lines of sight is left to creases and corners."""
     for view in (made(drawing).mesh, made(drawing).side()):
-        assert flange_share(look(view)) < 0.005
+        assert flange_share(front_view(view)) < 0.005
 
 
 # Gaps between parts ---------------------------------------------------------------------------------------------------

@@ -1,1 +1,1 @@
-"""Reading collections: rows of CSV, GeoJSON and GeoPackage files."""
+"""Readers of collections: rows of CSV, GeoJSON and GeoPackage files."""

@@ -1,8 +1,8 @@
 """Rows of a CSV file (RFC 4180), as spreadsheets and GDAL write them.
 
-The first line names the columns. Commas, semicolons or tabs separate them: those that make `figure` one of the names.
-UTF-8, or UTF-16 with a byte order mark. Numbers have a decimal point, also between semicolons: a comma would have
-to be guessed for every option there is.
+The first line names the columns. The separator is the comma, semicolon or tab that makes `figure` one of the names.
+UTF-8, or UTF-16 with a byte order mark. Numbers have a decimal point, even between semicolons: decimal commas would
+have to be guessed for every option.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from fig2mesh.batch.collections.rows import (
     FIGURE,
     MAX_RECORD,
     MAX_TEXT,
+    InvalidValue,
     Row,
-    Unfit,
     check_columns,
     column_name,
     make_row,
@@ -34,7 +34,7 @@ UTF8 = "save the table as CSV UTF-8"
 NO_TABLE = "give a table whose first line names the columns"
 
 _SEPARATOR_LINE = re.compile(r'"?sep=([,;\t])"?\s*', re.IGNORECASE)
-"""First line by which spreadsheets tell each other the separator."""
+"""First line in which spreadsheets declare the separator."""
 
 _SURROGATE = re.compile("[\ud800-\udfff]")
 
@@ -44,7 +44,7 @@ class _TooLong(Exception):
 
 
 class _Lines:
-    """Lines of a text, counted; those of the present row can be read again."""
+    """Numbered lines of a text; those of the current row can be read again."""
 
     def __init__(self, path: Path, text: TextIOWrapper, encoding: str) -> None:
         self.path, self.text, self.encoding = path, text, encoding
@@ -68,13 +68,13 @@ class _Lines:
         return line
 
     def begin(self) -> int:
-        """A new row; the number of the line on which it starts."""
+        """Begin a row; return the number of the line on which it starts."""
         self._taken.clear()
         self._size = 0
         return self.number + 1
 
     def back(self, keep: int = 1) -> None:
-        """Read all lines of this row again but the first `keep`, and skip what is left of one that is too long."""
+        """Push back all lines of this row but the first `keep`, and skip the rest of a line that is too long."""
         while self._taken and not self._again and not self._taken[-1].endswith(("\n", "\r")):
             rest = self._read()
             if not rest:
@@ -107,21 +107,21 @@ def _opened(path: Path) -> Iterator[_Lines]:
             text = TextIOWrapper(stream, "utf-16", errors="surrogatepass", newline="")
             yield _Lines(path, text, "UTF-16")
         else:
-            # Bytes that are no UTF-8 become lone surrogates, by which their line is known.
+            # Bytes that are not UTF-8 become lone surrogates, which identify their line.
             text = TextIOWrapper(stream, "utf-8-sig", errors="surrogateescape", newline="")
             yield _Lines(path, text, "UTF-8")
 
 
 def csv_columns(path: Path) -> tuple[str, ...]:
-    """Names of the columns, as rows have them."""
+    """Names of the columns, as in `Row.values`."""
     with _opened(path) as lines:
         return tuple(name for name in _header(path, lines)[0] if name)
 
 
 def csv_rows(path: Path) -> Iterator[Row]:
-    """The rows of a CSV file; lines without any value are skipped.
+    """Rows of a CSV file; lines without any value are skipped.
 
-    A row with a quote that does not close is one with a problem; the next one starts on the line after it.
+    A row with an unclosed quote has a problem; the next row starts on the following line.
 
     Raises InputError for files without a usable header, and for text that is not UTF-8, naming the line.
     """
@@ -131,14 +131,14 @@ def csv_rows(path: Path) -> Iterator[Row]:
         number = 0
         while True:
             first = lines.begin()
-            problem: Unfit | None = None
+            problem: InvalidValue | None = None
             cells: Sequence[str] = ()
             try:
                 cells = next(table)
             except StopIteration:
                 return
             except _TooLong:
-                problem = Unfit(f"more than {MAX_RECORD:,} characters", "close its quotes, or shorten it")
+                problem = InvalidValue(f"more than {MAX_RECORD:,} characters", "close its quotes, or shorten it")
                 lines.back()
             except csv.Error as error:
                 problem = _unquoted(error)
@@ -157,56 +157,58 @@ def _table(lines: _Lines, separator: str) -> Iterator[list[str]]:
     return csv.reader(lines, delimiter=separator, skipinitialspace=separator != "\t", strict=True)
 
 
-def _unquoted(error: csv.Error) -> Unfit:
+def _unquoted(error: csv.Error) -> InvalidValue:
     if "field larger" in str(error):
-        return Unfit(f"a cell of more than {MAX_TEXT:,} characters", "close its quotes, or shorten it")
+        return InvalidValue(f"a cell of more than {MAX_TEXT:,} characters", "close its quotes, or shorten it")
     if "unexpected end" in str(error):
-        return Unfit("a quote that does not close", "close it, and double quotes within quotes")
-    return Unfit("a quote in the middle of a cell", "double quotes within quotes")
+        return InvalidValue("unclosed quote", "close it, and double quotes within quotes")
+    return InvalidValue("quote in the middle of a cell", "double quotes within quotes")
 
 
-def _misfit(names: Sequence[str], cells: Sequence[str]) -> Unfit | None:
+def _misfit(names: Sequence[str], cells: Sequence[str]) -> InvalidValue | None:
     count = len(cells)
     while count > len(names) and not cells[count - 1].strip():
         count -= 1
     if count != len(names):
-        remedy = "quote cells that hold the separator" if count > len(names) else "give all of them, also empty ones"
-        return Unfit(f"{count} cells under {len(names)} headings", remedy)
+        remedy = (
+            "quote cells that contain the separator" if count > len(names) else "give all cells, including empty ones"
+        )
+        return InvalidValue(f"{count} cells under {len(names)} headings", remedy)
     for name, cell in zip(names, cells, strict=False):
         if not name and cell.strip():
-            return Unfit(f"{shown(cell)!r} under an empty heading", "name the column")
+            return InvalidValue(f"{shown(cell)!r} under an empty heading", "name the column")
     return None
 
 
 def _header(path: Path, lines: _Lines) -> tuple[list[str], str]:
-    """Names of the columns, "" for those without, and the separator."""
+    """Names of the columns, "" for columns without a name, and the separator."""
     separators = SEPARATORS
     try:
         while True:
             lines.begin()
             line = next(lines, "")
             if not line:
-                raise InputError(path, "no line with names of columns", f"write one, with {FIGURE} among them")
-            if told := _SEPARATOR_LINE.fullmatch(line):
-                separators = told.group(1)
+                raise InputError(path, "no header line", f"name the columns, with {FIGURE} among them")
+            if declared := _SEPARATOR_LINE.fullmatch(line):
+                separators = declared.group(1)
             elif line.strip():
                 lines.back(keep=0)
                 break
         tried = {separator: _names(lines, separator) for separator in separators}
         separator = max(tried, key=lambda each: (FIGURE in tried[each], len(tried[each])))
         if FIGURE not in tried[separator] and not all(tried.values()):
-            raise InputError(path, "a quote in its first line that does not close", "close it")
+            raise InputError(path, "unclosed quote in the first line", "close it")
         lines.begin()
         next(_table(lines, separator))
     except _TooLong:
-        raise InputError(path, f"its first line is longer than {MAX_RECORD:,} characters", NO_TABLE) from None
+        raise InputError(path, f"first line longer than {MAX_RECORD:,} characters", NO_TABLE) from None
     names = tried[separator]
     check_columns(path, names)
     return names, separator
 
 
 def _names(lines: _Lines, separator: str) -> list[str]:
-    """The names of the columns if this is the separator; none if its quotes are wrong then."""
+    """Names of the columns if this is the separator; empty if its quotes are then invalid."""
     lines.begin()
     try:
         return [column_name(cell) for cell in next(_table(lines, separator))]

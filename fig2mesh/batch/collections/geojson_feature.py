@@ -1,6 +1,6 @@
 """A GeoJSON feature (RFC 7946), from the events of a streaming parser.
 
-What is not needed is skipped without being kept: geometries other than points, members that the format does not know.
+Geometries other than points, and foreign members, are skipped without being stored.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from fig2mesh.batch.collections.rows import (
     MAX_NESTING,
     MAX_RECORD,
     MAX_TEXT,
+    InvalidValue,
     Point,
     Row,
-    Unfit,
     column_name,
     fit,
     make_row,
@@ -30,37 +30,37 @@ Event = tuple[str, Any]
 Events = Iterator[Event]
 
 MAX_QUIET = 1 << 20
-"""Bytes of a file without a new value in them: a longer text than any row may have, or blanks."""
+"""Maximum number of bytes without a new value: more is a longer text than any row may have, or blanks."""
 
 MAX_DIGITS = 640
-"""Digits in a row: the fewest that Python can be told to refuse (`sys.set_int_max_str_digits`). What it refuses is
-not only no number: the parser of ijson in C (3.6) goes on with a null pointer after it."""
+"""Maximum number of consecutive digits: the lowest limit that `sys.set_int_max_str_digits` accepts. Integers over
+Python's limit must not reach the C parser of ijson (3.6), which continues with a null pointer after them."""
 
 CHUNK = 1 << 16
 
 OPEN = ("start_map", "start_array")
 CLOSE = ("end_map", "end_array")
 
-OBJECT = Unfit("a value that is an object", "give text, a number, or a list of them")
-DEEP = Unfit(f"lists nested deeper than {MAX_NESTING}", "flatten them")
-LONG = Unfit(f"a list of more than {MAX_ITEMS:,} items", "shorten it")
-TEXT = Unfit(f"more than {MAX_TEXT:,} characters", "give a shorter text")
-TWICE = Unfit("given twice", "give it once")
+OBJECT = InvalidValue("an object as a value", "give text, a number, or a list of these")
+DEEP = InvalidValue(f"lists nested deeper than {MAX_NESTING}", "flatten them")
+LONG = InvalidValue(f"a list of more than {MAX_ITEMS:,} items", "shorten it")
+TEXT = InvalidValue(f"more than {MAX_TEXT:,} characters", "give a shorter text")
+TWICE = InvalidValue("given twice", "give it once")
 
 BROKEN = (ijson.JSONError, ValueError, ArithmeticError)
-"""What the parsers of ijson raise for bytes that are not JSON: ValueError for texts that are not Unicode,
-ArithmeticError for exponents beyond all measure."""
+"""Exceptions of the parsers of ijson for invalid JSON: ValueError for texts that are not Unicode, ArithmeticError for
+exponents that are too large."""
 
 _DIGITS = bytes(ord("0") if chr(code).isdecimal() and code < 128 else ord(" ") for code in range(256))
 _TOO_MANY = b"0" * (MAX_DIGITS + 1)
 
 
 class NotJson(Exception):
-    """The parser's finding, in one line."""
+    """Invalid JSON; the message is the parser's finding, in one line."""
 
 
 def events_of(stream: BinaryIO) -> Events:
-    """Events of ijson, where no value can fill the memory; raises NotJson after those before the fault."""
+    """Events of ijson, with limits on the size of values. Raises NotJson after the events before the error."""
     found = ijson.sendable_list()
     parser = ijson.basic_parse_coro(found)
     quiet, digits = 0, b""
@@ -85,12 +85,12 @@ def events_of(stream: BinaryIO) -> Events:
         if fault:
             raise NotJson(fault)
     finally:
-        # A parser that is left in the middle of a document complains, on stderr if it is not asked.
+        # A parser abandoned in the middle of a document reports an error, on stderr unless it is closed here.
         _fault(parser.close)
 
 
 def _fault(act: Callable[[], object]) -> str | None:
-    """What a parser finds wrong, in one line."""
+    """Error of a call of a parser, in one line, or None."""
     try:
         act()
     except BROKEN as error:
@@ -104,30 +104,30 @@ def _fault(act: Callable[[], object]) -> str | None:
 
 @dataclass(slots=True)
 class Feature:
-    """Members of a GeoJSON object that are of use, and what was wrong with them."""
+    """Members of a GeoJSON object that are used, and the first problem with them."""
 
     kind: object = None
     properties: dict[str, object] = field(default_factory=dict)
-    geometry: Point | Unfit | None = None
-    problem: Unfit | None = None
-    seen: set[str] = field(default_factory=set)
+    geometry: Point | InvalidValue | None = None
+    problem: InvalidValue | None = None
+    members: set[str] = field(default_factory=set)
 
     def row(self, number: int, where: str) -> Row:
         problem = self.problem
         if self.kind != "Feature" and problem is None:
             kind = "no type" if self.kind is None else f"type {shown(self.kind)}"
-            problem = Unfit(f"{kind} where a Feature is expected", "give features")
+            problem = InvalidValue(f"{kind} where a Feature is expected", "give features")
         return make_row(number, where, self.properties.items(), problem, lambda: self.geometry)
 
     def member(self, key: str, events: Events) -> None:
-        """Read the value of a member; those that are of no use are skipped."""
+        """Read the value of a member; unused members are skipped."""
         event, value = next(events)
         if key not in ("type", "properties", "geometry"):
             skip(events, event in OPEN)
             return
-        if key in self.seen:
-            self.problem = self.problem or TWICE.of(key)
-        self.seen.add(key)
+        if key in self.members:
+            self.problem = self.problem or TWICE.in_column(key)
+        self.members.add(key)
         if key == "type":
             self.kind = value if event == "string" else event
             skip(events, event in OPEN)
@@ -136,17 +136,17 @@ class Feature:
         elif event == "start_map":
             self.geometry = _geometry(events)
         elif event != "null":
-            self.problem = self.problem or Unfit("no object", "give an object, or null").of(key)
+            self.problem = self.problem or InvalidValue("not an object", "give an object, or null").in_column(key)
             skip(events, event in OPEN)
 
 
 def read_feature(events: Events, first: Event) -> Feature:
-    """A feature, from the first event of a value."""
+    """Read a feature; first : first event of its value."""
     feature = Feature()
     event, value = first
     if event != "start_map":
         skip(events, event in OPEN)
-        feature.problem = Unfit("no object where a Feature is expected", "give features")
+        feature.problem = InvalidValue("not an object where a Feature is expected", "give features")
         return feature
     for event, value in events:
         if event == "end_map":
@@ -155,9 +155,9 @@ def read_feature(events: Events, first: Event) -> Feature:
     return feature
 
 
-def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
-    """Read the members of an object into values by column; what is wrong with it as a whole, or None."""
-    problem: Unfit | None = None
+def _properties(events: Events, found: dict[str, object]) -> InvalidValue | None:
+    """Read the members of an object into `found`, by column; return the problem of the whole object, or None."""
+    problem: InvalidValue | None = None
     room = MAX_RECORD
     for event, key in events:
         if event == "end_map":
@@ -167,7 +167,7 @@ def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
         if problem is not None or room < 0 or len(found) >= MAX_COLUMNS:
             if problem is None:
                 much = f"{MAX_COLUMNS:,} properties" if room >= 0 else f"{MAX_RECORD:,} characters in its properties"
-                problem = Unfit(f"more than {much}", "leave some out")
+                problem = InvalidValue(f"more than {much}", "leave some out")
             skip(events, event in OPEN)
             continue
         if event == "start_map":
@@ -181,7 +181,7 @@ def _properties(events: Events, found: dict[str, object]) -> Unfit | None:
             value = value if len(value) <= MAX_TEXT else TEXT
         name = column_name(key)
         if not name:
-            value = Unfit("a property without a name", "name it") if value is not None else None
+            value = InvalidValue("property without a name", "name it") if value is not None else None
         found[name] = TWICE if name in found else value
     return problem
 
@@ -192,8 +192,8 @@ def _length(value: object) -> int:
     return len(value) if isinstance(value, str) else 0
 
 
-def _list(events: Events, room: int = MAX_RECORD) -> tuple[object, ...] | Unfit:
-    """The rest of a list with the lists in it; room: characters that its texts may have."""
+def _list(events: Events, room: int = MAX_RECORD) -> tuple[object, ...] | InvalidValue:
+    """Read the rest of a list, with nested lists; room : maximum number of characters of its texts."""
     stack: list[list[object]] = [[]]
     count = 0
     for event, value in events:
@@ -217,11 +217,11 @@ def _list(events: Events, room: int = MAX_RECORD) -> tuple[object, ...] | Unfit:
             stack.append([])
         else:
             stack[-1].append(value)
-    raise AssertionError("a list that does not end is an error of the parser")
+    raise AssertionError("the parser must report lists that do not end")
 
 
 def skip(events: Events, depth: int) -> None:
-    """Leave as many lists and objects, with all that is in them."""
+    """Skip the rest of `depth` nested lists and objects."""
     if depth:
         for event, _ in events:
             depth += (event in OPEN) - (event in CLOSE)
@@ -229,8 +229,8 @@ def skip(events: Events, depth: int) -> None:
                 return
 
 
-def _geometry(events: Events) -> Point | Unfit | None:
-    """The point of a geometry object; None: it is empty."""
+def _geometry(events: Events) -> Point | InvalidValue | None:
+    """Point of a geometry object; None if it is empty."""
     kind: object = None
     coordinates: object = None
     for event, key in events:
@@ -246,12 +246,12 @@ def _geometry(events: Events) -> Point | Unfit | None:
     if kind == "MultiPoint" and isinstance(coordinates, tuple) and len(coordinates) == 1:
         coordinates = coordinates[0]
     elif kind != "Point":
-        return Unfit(f"its geometry is a {shown(kind)}", "give a Point, or columns lon and lat")
+        return InvalidValue(f"its geometry is a {shown(kind)}", "give a Point, or columns lon and lat")
     if coordinates == ():
         return None
     if not isinstance(coordinates, tuple) or len(coordinates) < 2:
-        return Unfit("a point without two coordinates", "give longitude and latitude")
+        return InvalidValue("point with fewer than two coordinates", "give longitude and latitude")
     numbers = [fit(each) for each in coordinates[:3]]
     if not all(isinstance(each, int | float) and not isinstance(each, bool) for each in numbers):
-        return Unfit(f"a point at {shown(coordinates)}", "give finite numbers")
+        return InvalidValue(f"point at {shown(coordinates)}", "give finite numbers")
     return Point(*(float(each) for each in numbers))  # type: ignore[arg-type]

@@ -1,8 +1,7 @@
-"""Rows of GeoJSON (RFC 7946): a FeatureCollection, or features one a line or record (RFC 8142), as a stream.
+"""Rows of GeoJSON (RFC 7946): a FeatureCollection, or one feature per line or record (RFC 8142), as a stream.
 
-What is not needed is skipped without being kept: geometries other than points, members that the format does not know.
-Coordinates are WGS 84 longitude, latitude and height above the ellipsoid; a `crs` member of the format of 2008 that
-says otherwise is refused.
+Geometries other than points, and foreign members, are skipped without being stored. Coordinates are WGS 84 longitude,
+latitude and height above the ellipsoid; files with another `crs` member (GeoJSON of 2008) are rejected.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from fig2mesh.batch.collections.geojson_feature import (
     read_feature,
     skip,
 )
-from fig2mesh.batch.collections.rows import MAX_NESTING, Row, Unfit, make_row, shown
+from fig2mesh.batch.collections.rows import MAX_NESTING, InvalidValue, Row, make_row, shown
 from fig2mesh.errors import InputError
 
 MAX_LINE = 1 << 24
-"""Bytes of a feature on a line of its own, with an outline of hundreds of thousands of vertices."""
+"""Maximum bytes of a feature on a line of its own: enough for an outline of hundreds of thousands of vertices."""
 
 BOM = b"\xef\xbb\xbf"
 RECORD = b"\x1e"
@@ -44,18 +43,18 @@ JSON = "give valid JSON in UTF-8, with null for NaN"
 
 
 def geojson_rows(path: Path) -> Iterator[Row]:
-    """The rows of a GeoJSON file: one a feature, its properties as columns.
+    """Rows of a GeoJSON file: one per feature, with its properties as columns.
 
     Broken JSON ends a FeatureCollection; where each feature has its own line or record, it is the problem of that row.
 
-    Raises InputError for what is no GeoJSON, naming the feature.
+    Raises InputError for invalid GeoJSON, naming the feature.
     """
     try:
         with path.open("rb") as stream:
             head = stream.read(1 << 12)
             start = len(BOM) if head.startswith(BOM) else 0
             if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in head:
-                raise InputError(path, "UTF-16, or no text", "save it as UTF-8")
+                raise InputError(path, "UTF-16, or not a text file", "save it as UTF-8")
             stream.seek(start)
             if head[start:].lstrip().startswith(RECORD):
                 yield from _sequence(_records(stream))
@@ -70,7 +69,7 @@ def geojson_rows(path: Path) -> Iterator[Row]:
 
 
 def _by_lines(path: Path, stream: BinaryIO, head: bytes) -> bool:
-    """Whether each line is a feature of its own: the first two are no parts of one document, or its suffix says so."""
+    """Whether each line is a feature of its own: the first two are not parts of one document, or by the suffix."""
     lines: list[bytes] = []
     while len(lines) < 2 and (line := stream.readline(MAX_LINE)):
         if line := line.strip():
@@ -81,7 +80,7 @@ def _by_lines(path: Path, stream: BinaryIO, head: bytes) -> bool:
 
 
 def _lines(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
-    """Lines that are not blank, with their names; None for one that is too long."""
+    """Lines that are not blank, with their names; None for a line that is too long."""
     number = 0
     while line := stream.readline(MAX_LINE):
         number += 1
@@ -94,7 +93,7 @@ def _lines(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
-    """Records, each after a record separator, with their names; None for one that is too long."""
+    """Records, each after a record separator, with their names; None for a record that is too long."""
     number = 0
     record = bytearray()
     while True:
@@ -106,7 +105,7 @@ def _records(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
                 yield f"record {number}", bytes(record) if len(record) <= MAX_LINE else None
             if index:
                 record.clear()
-            # One byte too many is kept as the sign of it.
+            # One excess byte is kept, to mark a record that is too long.
             record += part[: MAX_LINE + 1 - len(record)]
         if not chunk:
             return
@@ -115,7 +114,7 @@ def _records(stream: BinaryIO) -> Iterator[tuple[str, bytes | None]]:
 def _sequence(records: Iterator[tuple[str, bytes | None]]) -> Iterator[Row]:
     for number, (where, record) in enumerate(records, start=1):
         if record is None:
-            yield make_row(number, where, (), Unfit(f"more than {MAX_LINE:,} bytes", "simplify its geometry"))
+            yield make_row(number, where, (), InvalidValue(f"more than {MAX_LINE:,} bytes", "simplify its geometry"))
             continue
         try:
             events = events_of(BytesIO(record))
@@ -124,30 +123,30 @@ def _sequence(records: Iterator[tuple[str, bytes | None]]) -> Iterator[Row]:
                 pass
             row = feature.row(number, where)
         except NotJson as error:
-            row = make_row(number, where, (), Unfit(f"not JSON ({error})", JSON))
+            row = make_row(number, where, (), InvalidValue(f"not JSON ({error})", JSON))
         yield row
 
 
 def _document(path: Path, stream: BinaryIO, start: int) -> Iterator[Row]:
-    """The features of a FeatureCollection, or the one that is the whole document."""
+    """Rows of a FeatureCollection, or of a single Feature."""
     events = events_of(stream)
     top = Feature()
     number = 0
     try:
         if next(events) != ("start_map", None):
-            raise InputError(path, "no JSON object", "give a GeoJSON FeatureCollection")
+            raise InputError(path, "not a JSON object", "give a GeoJSON FeatureCollection")
         for event, key in events:
             if event != "map_key":
                 continue
             if key == "crs":
                 _check_crs(path, _crs(events))
-            elif key == "features" and key in top.seen:
-                raise InputError(path, "two members features", "give one FeatureCollection")
+            elif key == "features" and key in top.members:
+                raise InputError(path, "two members named features", "give one FeatureCollection")
             elif key == "features":
-                if "crs" not in top.seen:
+                if "crs" not in top.members:
                     _check_crs(path, _later_crs(path, start))
                 if next(events)[0] != "start_array":
-                    raise InputError(path, "its features are no list", "give a GeoJSON FeatureCollection")
+                    raise InputError(path, "features is not a list", "give a GeoJSON FeatureCollection")
                 for event, value in events:
                     if event == "end_array":
                         break
@@ -159,17 +158,17 @@ def _document(path: Path, stream: BinaryIO, start: int) -> Iterator[Row]:
                 if key == "type" and top.kind not in ("FeatureCollection", "Feature"):
                     raise InputError(path, f"type {shown(top.kind)}", "give a GeoJSON FeatureCollection")
             if key in ("crs", "features"):
-                top.seen.add(key)
+                top.members.add(key)
     except NotJson as error:
         raise InputError(path, f"{f'after feature {number}, ' if number else ''}not JSON ({error})", JSON) from None
-    if "features" not in top.seen:
+    if "features" not in top.members:
         if top.kind != "Feature":
             raise InputError(path, "no features", "give a GeoJSON FeatureCollection")
         yield top.row(1, "feature 1")
 
 
 def _crs(events: Events) -> str | None:
-    """Name in the value of a `crs` member (GeoJSON of 2008); "": there is none; None: the value is null."""
+    """Name in the value of a `crs` member (GeoJSON of 2008); "" if it has none; None if the value is null."""
     event, _ = next(events)
     if event == "null":
         return None
@@ -192,7 +191,7 @@ def _crs(events: Events) -> str | None:
 
 
 def _later_crs(path: Path, start: int) -> str | None:
-    """The same, of a member that may come after the features, whose places it changes; None: there is none."""
+    """Name of the `crs` member where it comes after the features that it applies to; None without one."""
     with path.open("rb") as stream:
         tail = b""
         while chunk := stream.read(CHUNK):

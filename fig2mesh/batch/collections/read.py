@@ -1,7 +1,7 @@
-"""Read a collection of figures: CSV, GeoJSON or GeoPackage, one row a figure.
+"""Read a collection of figures: CSV, GeoJSON or GeoPackage, one row per figure.
 
-The rows come one after another and are not kept, so that a collection may be larger than memory. One that can't be
-used comes out all the same, with its problem, and does not stop the others. What the columns mean is in `rows`.
+Rows are streamed, so that a collection may be larger than memory. An unusable row is returned with its problem, and
+does not stop the others. For the meaning of the columns see `rows`.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ SQLITE_MAGIC = b"SQLite format 3\0"
 
 
 def read_rows(path: Path, layer: str | None = None) -> Iterator[Row]:
-    """The rows of a collection, in the order of the file.
+    """Rows of a collection, in the order of the file.
 
-    path : CSV with commas, semicolons or tabs (.csv, .tsv, .txt); GeoJSON, a FeatureCollection or one feature a line
-        (.geojson, .json, .geojsonl, .ndjson); GeoPackage (.gpkg). Where the suffix is another one, the content decides
+    path : CSV with commas, semicolons or tabs (.csv, .tsv, .txt); GeoJSON, a FeatureCollection or one feature per
+        line (.geojson, .json, .geojsonl, .ndjson); GeoPackage (.gpkg). With other suffixes the content decides
     layer : of a GeoPackage; default: the only one with a column `figure`
 
-    Points give `lon` and `lat` of rows that name no place themselves, and `altitude` where they have a third
+    Points give `lon` and `lat` of rows without a place in their columns, and `altitude` where they have a third
     coordinate.
 
     Raises InputError for a file that can't be read, also after some rows, and for one of more than `MAX_ROWS`.
@@ -49,7 +49,7 @@ def read_rows(path: Path, layer: str | None = None) -> Iterator[Row]:
 
 
 def columns(path: Path, layer: str | None = None) -> tuple[str, ...] | None:
-    """Names of the columns, as rows have them; None for GeoJSON, where each feature has its own."""
+    """Names of the columns, as in `Row.values`; None for GeoJSON, where each feature has its own."""
     kind = _kind(path, layer)
     if kind == "gpkg":
         from fig2mesh.batch.collections.geopackage_rows import geopackage_columns
@@ -59,7 +59,7 @@ def columns(path: Path, layer: str | None = None) -> tuple[str, ...] | None:
 
 
 def _kind(path: Path, layer: str | None) -> str:
-    """csv, geojson or gpkg."""
+    """Kind of a collection: csv, geojson or gpkg."""
     try:
         if not path.exists():
             raise InputError(path, "no such file", "give a collection as CSV, GeoJSON or GeoPackage")
@@ -75,17 +75,21 @@ def _kind(path: Path, layer: str | None) -> str:
     if head.startswith(SQLITE_MAGIC):
         kind = "gpkg"
     elif suffix in GEOPACKAGE:
-        raise InputError(path, "not a GeoPackage", "give a file as QGIS or GDAL writes it")
+        raise InputError(path, "not a GeoPackage", "give a file written by QGIS or GDAL")
     elif not start:
         raise InputError(path, "empty", f"give a table with a column {'figure'!r}")
     elif suffix in OFFICE or head.startswith(b"PK\3\4"):
-        raise InputError(path, "a workbook or archive", "save the table as CSV UTF-8")
+        raise InputError(path, "is a workbook or archive", "save the table as CSV UTF-8")
     elif suffix in GEOJSON or (suffix not in TABLES and start[:1] in (b"{", b"\x1e")):
         kind = "geojson"
     elif suffix in TABLES:
         kind = "csv"
     else:
-        raise InputError(path, f"suffix {suffix or 'missing'}", "give a collection as CSV, GeoJSON or GeoPackage")
+        raise InputError(
+            path,
+            f"unknown suffix {suffix}" if suffix else "no suffix",
+            "give a collection as CSV, GeoJSON or GeoPackage",
+        )
     if layer is not None and kind != "gpkg":
-        raise InputError(path, f"layer {layer!r} of a file without layers", "leave it out, or give a GeoPackage")
+        raise InputError(path, f"--layer {layer!r} requires a GeoPackage", "leave it out, or give a GeoPackage")
     return kind

@@ -1,4 +1,4 @@
-"""Points of any reference system that pyproj can tie to WGS 84."""
+"""Transformation of points to WGS 84 from any reference system known to pyproj."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from collections.abc import Callable, Iterable, Sequence
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from fig2mesh.batch.collections.rows import Point, Unfit, shown
+from fig2mesh.batch.collections.rows import InvalidValue, Point, shown
 
 HAND = "give columns lon and lat"
 
 
 def to_wgs84(
     authority: object, code: object, definitions: Iterable[object]
-) -> Callable[[Sequence[Point]], Sequence[Point | Unfit]]:
-    """The transformation of a reference system, by its code (EPSG, 2056) or else one of its WKT definitions.
+) -> Callable[[Sequence[Point]], Sequence[Point | InvalidValue]]:
+    """Transformation from a reference system, given by its code (EPSG, 2056) or else by its WKT definitions.
 
-    Heights are taken as they are, in metres above the ellipsoid, where the system says nothing of them; where it does,
-    they are converted, and refused if that needs a grid that is not there. Points that can't be transformed are Unfit.
+    Without a vertical datum heights are metres above the ellipsoid, unchanged; with one they are converted, and
+    rejected if that needs a missing grid. Points that cannot be transformed become an InvalidValue.
     """
     crs = _crs(authority, code, definitions)
     if crs is None:
-        unknown = Unfit("the reference system of its layer is not known", f"reproject it to WGS 84, or {HAND}")
+        unknown = InvalidValue("unknown reference system of its layer", f"reproject it to WGS 84, or {HAND}")
         return lambda points: [unknown] * len(points)
     flat = _transformer(crs.to_2d(), "EPSG:4326")
     solid = _transformer(crs, "EPSG:4979") if len(crs.axis_info) == 3 else None
 
-    def transform(points: Sequence[Point]) -> list[Point | Unfit]:
+    def transform(points: Sequence[Point]) -> list[Point | InvalidValue]:
         if flat is None:
-            nothing = Unfit(f"no transformation from {shown(crs.name)} to WGS 84 is known", HAND)
+            nothing = InvalidValue(f"no known transformation from {shown(crs.name)} to WGS 84", HAND)
             return [nothing] * len(points)
         x, y = [each.lon for each in points], [each.lat for each in points]
         lon, lat = flat.transform(x, y)
@@ -44,12 +44,12 @@ def to_wgs84(
     return transform
 
 
-def _checked(crs: CRS, lon: float, lat: float, height: float | None) -> Point | Unfit:
+def _checked(crs: CRS, lon: float, lat: float, height: float | None) -> Point | InvalidValue:
     if not (math.isfinite(lon) and math.isfinite(lat)):
-        return Unfit(f"a point outside the area of {shown(crs.name)}", "check the reference system of its layer")
+        return InvalidValue(f"point outside the area of {shown(crs.name)}", "check the reference system of its layer")
     if height is not None and not math.isfinite(height):
-        finding = f"no conversion of heights of {shown(crs.name)} to the ellipsoid is at hand"
-        return Unfit(finding, "drop z, and give columns altitude and altitude_datum")
+        finding = f"no available conversion of heights from {shown(crs.name)} to the ellipsoid"
+        return InvalidValue(finding, "drop z, and give columns altitude and altitude_datum")
     return Point(lon, lat, height)
 
 

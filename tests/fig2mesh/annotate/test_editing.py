@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from fig2mesh.annotate.editing import STANDING, Subject, begin, packed, standing, unpacked
+from fig2mesh.annotate.editing import STANDING, AnnotatedPicture, begin, packed, standing, unpacked
 from fig2mesh.annotate.job import main_job
 from fig2mesh.annotate.server import HEADER, annotation_server
 from fig2mesh.errors import FigureError, InputError
@@ -31,12 +31,12 @@ def files(tmp_path: Path) -> DrawnFiles:
     return write_figure(tmp_path)
 
 
-def some(seed: int, height: int = 12, width: int = 9) -> tuple[Subject, Annotation]:
+def some(seed: int, height: int = 12, width: int = 9) -> tuple[AnnotatedPicture, Annotation]:
     random = np.random.default_rng(seed)
     mask = random.random((height, width)) < 0.6
     labels = np.where(mask, random.integers(0, len(PART_NAMES), mask.shape), 0).astype(np.uint8)
     joints = (random.random((21, 2)) * [width, height]).astype(np.float32)
-    subject = Subject("some", "some.png", np.zeros((height, width, 4), np.uint8), (0, 0), (width, height))
+    subject = AnnotatedPicture("some", "some.png", np.zeros((height, width, 4), np.uint8), (0, 0), (width, height))
     return subject, Annotation(mask, joints, random.random(21) < 0.5, labels, {"l_leg": "behind"})
 
 

@@ -15,7 +15,7 @@ from PIL import Image
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.ledger import WORK
 from fig2mesh.batch.row_files import Roots
-from fig2mesh.batch.task import Batch, Task
+from fig2mesh.batch.task import Batch, RowTask
 from fig2mesh.batch.tasks import make_task
 from tests.drawn import write_figure
 
@@ -53,7 +53,7 @@ def batch_of(folder: Path, out: Path, **changes: Any) -> Batch:
     return Batch(Roots(folder, folder.resolve()), out, **changes)
 
 
-def task_of(values: Mapping[str, Any], name: str = "person", number: int = 1) -> Task:
+def task_of(values: Mapping[str, Any], name: str = "person", number: int = 1) -> RowTask:
     """A row with a name."""
     return make_task(Row(number, f"line {number + 1}", values), name, name, {})
 

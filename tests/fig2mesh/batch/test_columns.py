@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column, is_known, request_of, shared_fields
-from fig2mesh.batch.task import Task
+from fig2mesh.batch.task import RowTask
 from fig2mesh.batch.tasks import FORMATS, make_task
 from fig2mesh.commands.options import request_options
 from fig2mesh.conversion.fields import request_fields
@@ -21,7 +21,7 @@ from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 
-def task_of(values: dict[str, Any], defaults: dict[str, Any]) -> Task:
+def task_of(values: dict[str, Any], defaults: dict[str, Any]) -> RowTask:
     return make_task(Row(1, "line 2", values), "n", "n", defaults)
 
 

@@ -242,7 +242,7 @@ def test_bad_rows_fail_in_one_line_and_leave_nothing(
         assert message in str(outcome.error)
         assert "\n" not in str(outcome.error)
         assert str(folder) + os.sep not in str(outcome.error)
-        assert not outcome.ours
+        assert not outcome.internal
     assert not (tmp_path / "person").exists()
 
 
@@ -278,6 +278,6 @@ def test_a_fault_of_ours_is_recorded_as_such_and_tried_again(
     with monkeypatch.context() as patch:
         patch.setattr(row_job, "_write", broken)
         outcome = convert_row(batch_of(folder, tmp_path), task_of(row))
-    assert outcome.ours
+    assert outcome.internal
     assert outcome.error == "internal error: RuntimeError: a bug"
     assert _done(convert_row(batch_of(folder, tmp_path), task_of(row))).ran == ("model", "measures")

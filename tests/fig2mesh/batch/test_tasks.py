@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fig2mesh.batch.collections.rows import Row
-from fig2mesh.batch.tasks import LONGEST_NAME, TAKEN, read_spool, tasks_of, write_spool
+from fig2mesh.batch.tasks import MAX_NAME, TAKEN, read_spool, tasks_of, write_spool
 
 
 def _rows(*values: dict[str, object]) -> list[Row]:
@@ -41,7 +41,7 @@ def test_names_are_one_folder_each_and_stay_inside(values: list[dict[str, str]])
     for name in names:
         assert Path(name).parts == (name,)
         assert not name.startswith(".")
-        assert len(name) <= LONGEST_NAME + 5
+        assert len(name) <= MAX_NAME + 5
 
 
 @given(

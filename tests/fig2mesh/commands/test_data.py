@@ -14,8 +14,11 @@ from fig2mesh.commands.main import cli, main
 from fig2mesh.training.bodies.pack import load_pack
 
 REFUSED = {
-    "pack, no assets": (["data", "pack", "--assets", "nowhere", "-o", "new.npz"], "--assets: no folder nowhere"),
-    "pack, there already": (["data", "pack", "-o", "there"], "there: exists"),
+    "pack, no assets": (
+        ["data", "pack", "--assets", "nowhere", "-o", "new.npz"],
+        "--assets: no such directory nowhere",
+    ),
+    "pack, there already": (["data", "pack", "-o", "there"], "there: already exists"),
     "pack, few poses": (["data", "pack", "--poses", "3", "-o", "new.npz"], "--poses"),
     "build, no pack": (["data", "build", "--pack", "none.npz", "-o", "data"], "none.npz: no such file"),
     "build, other file": (["data", "build", "--pack", "there", "-o", "data"], "there: not a pack"),
@@ -24,7 +27,7 @@ REFUSED = {
     "show, other file": (["data", "show", "there", "-o", "sheet.png"], "there"),
     "evaluate networks, there already": (
         ["evaluate", "networks", "--pack", "p", "--data", "d", "-o", "there"],
-        "there: exists",
+        "there: already exists",
     ),
 }
 

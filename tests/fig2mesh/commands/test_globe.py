@@ -77,8 +77,8 @@ def test_other_folders_are_left_alone(tmp_path: Path, farmer: Path, cesium_like:
     ("more", "finding"),
     [
         (["--cesium", "nowhere"], "--cesium: no CesiumJS in nowhere"),
-        (["gone.glb"], "gone.glb: is not there"),
-        (["--overlay", "map.png", "8", "47", "9", "48"], "--overlay: map.png is not there"),
+        (["gone.glb"], "gone.glb: no such file"),
+        (["--overlay", "map.png", "8", "47", "9", "48"], "--overlay: no such file map.png"),
         (["--overlay", "map.png", "8", "47"], "--overlay"),
     ],
 )

@@ -75,6 +75,7 @@ BAD = {
     "resume unknown": (("--resume-from", "dance", "--save-stages", "stages"), "dance"),
     "resume empty": (("--resume-from", "unwrap", "--save-stages", "stages"), "stages"),
     "report folder": (("--report", "missing/report.json"), "missing"),
+    "standard output": (("-o", "-"), "-o -: writing to stdout is not supported; name a file or a folder"),
 }
 
 
@@ -92,6 +93,50 @@ def test_bad_usage_is_one_line(
     assert captured.err.startswith("fig2mesh: ")
     assert captured.err.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
+
+
+UNKNOWN = {
+    "misspelt": (["viev", "a.png"], "unknown command 'viev' (did you mean 'view'?)"),
+    "misspelt, without a figure": (["rendr"], "unknown command 'rendr' (did you mean 'render'?)"),
+    "misspelt, with an option first": (["batsh", "-o", "out"], "unknown command 'batsh' (did you mean 'batch'?)"),
+    "help on a misspelt one": (["help", "viev"], "unknown command 'viev' (did you mean 'view'?)"),
+    "help on nothing like it": (["help", "xyzzy"], "unknown command 'xyzzy'"),
+    "a figure without suffix": (["xyzzy"], "xyzzy: no such file"),
+    "a figure named like a command": (["view.png"], "view.png: no such file"),
+}
+
+
+@pytest.mark.parametrize("case", UNKNOWN)
+def test_an_unknown_command_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words, expected = UNKNOWN[case]
+    assert main(words) == 2
+    captured = capfd.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith(f"fig2mesh: {expected}; ")
+    assert captured.err.count("\n") == 1
+
+
+def test_a_file_named_like_a_misspelt_command_is_a_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("viev", "help"):
+        Path(name).write_text("not a picture")
+        assert main([name]) == 2
+        message = capfd.readouterr().err
+        assert message.startswith(f"fig2mesh: {name}: ")
+
+
+def test_help_is_a_command(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["--help"]) == 0
+    wanted = capfd.readouterr().out
+    assert main(["help"]) == 0
+    assert capfd.readouterr().out == wanted
+    assert main(["help", "view"]) == 0
+    assert "fig2mesh view [OPTIONS] FIGURE" in capfd.readouterr().out
 
 
 def test_existing_output_is_kept(files: DrawnFiles, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -168,4 +213,4 @@ def test_a_missing_encoder_is_said_before_the_work(
 def test_places_need_a_place(tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
     assert main(["figure.png", "-o", str(tmp_path / name)]) == 2
     suffix = Path(name).suffix
-    assert f"{suffix} needs a place on earth; pass --lonlat LON LAT" in capsys.readouterr().err
+    assert f"{suffix} needs a place on the earth; give --lonlat LON LAT" in capsys.readouterr().err

@@ -107,17 +107,17 @@ def test_what_cannot_be_done_is_one_line(tmp_path: Path, capsys: Output, monkeyp
     with page_server("") as taken:
         port = address_of(taken).rsplit(":")[-1].strip("/")
         cases = (
-            (["-o", "there.html"], "there.html: exists"),
+            (["-o", "there.html"], "there.html: already exists; use --overwrite or choose another name"),
             (["-o", "page.png"], "ends in .html"),
-            (["-o", "nowhere/page.html"], "no folder nowhere"),
-            (["--effects", "light,glow"], "'glow' is no effect"),
+            (["-o", "nowhere/page.html"], "no such directory nowhere"),
+            (["--effects", "light,glow"], "unknown effect 'glow'"),
             (["--port", port], f"--port: {port} cannot be used"),
-            (["--cesium", "."], "pass --lonlat"),
+            (["--cesium", "."], "requires --lonlat"),
             (["--lonlat", "8", "47", "--cesium", "."], "no CesiumJS in ."),
             (["--lonlat", "8", "47"], "npm install cesium"),
             (["--lonlat", "8", "97", "-o", "page.html"], "latitude 97"),
-            (["--altitude", "3", "-o", "page.html"], "pass --lonlat"),
-            (["--textures", "none"], "none, but the page shows them"),
+            (["--altitude", "3", "-o", "page.html"], "add --lonlat"),
+            (["--textures", "none"], "view requires textures, not none"),
         )
         for options, expected in cases:
             assert main(["view", *figure, "--no-open", *options]) == 2, options

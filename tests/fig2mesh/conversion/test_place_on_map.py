@@ -210,7 +210,7 @@ def test_a_cut_out_figure_at_the_scale_of_the_sheet(sheet: Sheet) -> None:
     figure = read_figure(sheet.figure, keypoints=sheet.own_joints)
     request = asked(sheet.picture, at=tuple(FOOT_PX), size_from="map")
     placed = place(request, open_map(request), figure, sheet.figure)
-    assert "a pixel of cut.png is taken for a pixel of the sheet" in placed.notes[-1]
+    assert "a pixel of cut.png is assumed to be as large as a pixel of the sheet" in placed.notes[-1]
     assert placed.height_m == pytest.approx(height_on_picture(figure) * METRES_PX, rel=1e-3)
 
 
@@ -234,21 +234,22 @@ def test_an_annotation_made_for_a_larger_scan(sheet: Sheet, read: Figure, tmp_pa
 
 # fmt: off
 BAD = {
-    "twice": (["--map", "map.png", "--lonlat", "8", "47"], "--map: beside --lonlat"),
-    "at alone": (["--at", "1", "2"], "--at: given without a map"),
-    "crs alone": (["--map-crs", "EPSG:2056"], "--map-crs: given without a map"),
-    "transform alone": (["--map-transform", "tps"], "--map-transform: given without a map"),
-    "size alone": (["--size-from", "map", "--lonlat", "8", "47"], "--size-from map: given without a map"),
-    "size twice": (["--map", "map.png", "--size-from", "map", "--height-m", "2"], "beside --height-m"),
+    "twice": (["--map", "map.png", "--lonlat", "8", "47"], "--map: cannot be combined with --lonlat"),
+    "at alone": (["--at", "1", "2"], "--at: requires --map"),
+    "crs alone": (["--map-crs", "EPSG:2056"], "--map-crs: requires --map"),
+    "transform alone": (["--map-transform", "tps"], "--map-transform: requires --map"),
+    "size alone": (["--size-from", "map", "--lonlat", "8", "47"], "--size-from map: requires --map"),
+    "size twice": (["--map", "map.png", "--size-from", "map", "--height-m", "2"], "cannot be combined with --height-m"),
     "off the sheet": (["--map", "map.png", "--at", "1", "2000"], "is not on the sheet of 900×1000 px"),
     "no sheet": (["--map", "none.png"], "no such file"),
     "too few": (["--map", "map.png", "--map-transform", "poly3"], "7 control points, but poly3 needs 10"),
     "transform": (["--map", "map.png", "--map-transform", "magic"], "'magic' is not one of"),
     "altitude": (["--map", "map.png", "--altitude", "nan"], "--altitude"),
     "facing": (["--map", "map.png", "--facing", "up"], "no direction"),
-    "clamp without place": (["--altitude-mode", "clamp"], "--altitude-mode: given without a place"),
+    "clamp without place": (["--altitude-mode", "clamp"], "--altitude-mode: requires a place"),
     "clamp to a datum": (
-        ["--map", "map.png", "--altitude-mode", "clamp", "--altitude-datum", "egm96"], "heights above terrain have none"
+        ["--map", "map.png", "--altitude-mode", "clamp", "--altitude-datum", "egm96"],
+        "--altitude-mode clamp: cannot be combined with --altitude-datum egm96",
     ),
 }
 # fmt: on
@@ -272,7 +273,7 @@ def test_a_figure_that_is_not_the_sheet_needs_a_pixel(
     sheet: Sheet, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run([*sheet.alone, "--map", sheet.picture, *FAST, "-o", tmp_path / "a.glb"]) == 2
-    assert "cut.png is not the picture of map.points; pass --at X Y" in capsys.readouterr().err
+    assert "cut.png is not the picture of map.points; give --at X Y" in capsys.readouterr().err
 
 
 def test_plan_takes_the_options_and_reads_nothing(sheet: Sheet, capsys: pytest.CaptureFixture[str]) -> None:
@@ -290,5 +291,5 @@ def test_formats_that_cannot_clamp_are_told() -> None:
 
 
 def test_options_of_a_place_alone_are_checked_before_the_figure(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="beside --lonlat"):
+    with pytest.raises(InputError, match="cannot be combined with --lonlat"):
         open_map(asked(tmp_path / "map.png", lonlat=(8.0, 47.0)))

@@ -46,8 +46,9 @@ def test_paths_may_be_texts_and_lists_tuples() -> None:
         ({"lonlat": (1.0,)}, "--lonlat: 1 values; give 2: LON LAT"),
         ({"lonlat": 8.5}, "--lonlat: unexpected float 8.5; give 2 values, each a number"),
         ({"overwrite": 1}, "--overwrite: unexpected int 1; give True or False"),
-        ({"effects": ("light", "none")}, "--effect: none beside light; give either none or the effects wanted"),
-        ({"visible_from": -5}, "--visible-from: -5 m; give a distance in metres"),
+        ({"effects": ("light", "none")}, "--effect: none cannot be combined with light; give one of them"),
+        ({"outputs": ("a.glb", "-")}, "-o -: writing to stdout is not supported; name a file or a folder"),
+        ({"visible_from": -5}, "--visible-from: -5 m; give a positive distance in metres"),
     ],
 )
 def test_what_cannot_be_is_refused_by_name(values: dict[str, Any], message: str) -> None:

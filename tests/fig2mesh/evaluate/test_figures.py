@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from fig2mesh.commands.main import main
-from fig2mesh.evaluate.figures import COLUMNS, Row, as_json, as_markdown, find_drawings, summary
+from fig2mesh.evaluate.figures import COLUMNS, FigureRow, as_json, as_markdown, find_drawings, summary
 from tests.drawn import write_figure
 
 
@@ -83,9 +83,9 @@ def test_a_folder_without_figures_is_refused_in_one_line(
 
 def test_median_and_worst_are_over_what_was_made() -> None:
     rows = [
-        Row("a", facts(silhouette_iou=0.9, gap_share=0.01, components=1, closed=True)),
-        Row("b", facts(silhouette_iou=0.8, gap_share=0.04, components=4, closed=False)),
-        Row("c", {}, "c.png: broken | for good"),
+        FigureRow("a", facts(silhouette_iou=0.9, gap_share=0.01, components=1, closed=True)),
+        FigureRow("b", facts(silhouette_iou=0.8, gap_share=0.04, components=4, closed=False)),
+        FigureRow("c", {}, "c.png: broken | for good"),
     ]
     median, worst = summary(rows)
     assert median["silhouette_iou"] == pytest.approx(0.85)
@@ -101,7 +101,7 @@ def test_median_and_worst_are_over_what_was_made() -> None:
 
 
 def test_nothing_made_has_no_median() -> None:
-    table = as_markdown([Row("a", {}, "empty")]).splitlines()
+    table = as_markdown([FigureRow("a", {}, "empty")]).splitlines()
     assert len(table) == 3
     assert {line.count(" | ") for line in (table[0], table[2])} == {len(COLUMNS)}
 

@@ -154,7 +154,7 @@ def test_the_camera_looks_at_the_nose_side_and_the_ground_is_level_with_the_feet
 @pytest.mark.slow
 def test_parts_are_picked_named_and_stand_out(seen: dict[str, Any]) -> None:
     assert seen["pick"] == "torso"
-    assert seen["part"] == "part: head, the drawing showed 50 % of it"
+    assert seen["part"] == "part: head, 50 % observed in the drawing"
     assert seen["unpicked"] is None
     assert (seen["clicked"], seen["unclicked"]) == ("torso", None)
     before, after = (pixels(seen[f"{name} picture"])[..., :3].astype(int) for name in ("model", "part"))
@@ -211,7 +211,7 @@ def test_observed_or_inferred_is_shown_by_texels_where_a_file_has_them(
     with serving(page_server(globe_page(assets), 0, {"cesium": cesium}, page_files(assets))) as address:
         found = look(address, *actions, size=(SIZE, SIZE))
     assert found["messages"] == []
-    assert found["results"][6]["value"] == "for each point of the surface"
+    assert found["results"][6]["value"] == "per point of the surface"
     front, back, drawn = (pixels(found["results"][i]["png"])[SIZE // 2, SIZE // 2, :3].astype(int) for i in (3, 5, 8))
     assert front[2] > front[0] + 60, "what the drawing showed is blue"
     assert back[0] > back[2] + 60, "what it did not is orange"

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from exporters.asset import TexturedMesh
-from fig2mesh.measure.front import flange_share, gap, look, thickness_at, wall_share
+from fig2mesh.measure.front import flange_share, front_view, gap, thickness_at, wall_share
 from fig2mesh.measure.solid import crossing_triangles, inner_shells, laws, quality, solid_mesh, thinnest_wall
 from fig2mesh.records import Mesh
 
@@ -95,13 +95,13 @@ def test_all_is_missing_where_the_model_stands_elsewhere() -> None:
 @pytest.mark.parametrize("radius", [0.03, 0.08, 0.15])
 def test_round_bodies_have_neither_flange_nor_wall(radius: float) -> None:
     for body in (ball(radius), capsule(radius)):
-        front = look(model(body))
+        front = front_view(model(body))
         assert flange_share(front) == 0.0
         assert wall_share(front) < 0.01
 
 
 def test_a_cookie_cutter_is_wall_all_round() -> None:
-    front = look(model(box(0.3, 0.5, 0.2)))
+    front = front_view(model(box(0.3, 0.5, 0.2)))
     assert wall_share(front) > 0.98
     assert flange_share(front) == 0.0
 
@@ -111,7 +111,7 @@ def test_a_half_round_body_has_half_a_wall() -> None:
     body = trimesh.creation.cylinder(0.1, 0.4, sections=256)
     body.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
     # Normals turn round the corners.
-    assert wall_share(look(model(body))) == pytest.approx(0.2 / (0.2 + 0.4), abs=0.05)
+    assert wall_share(front_view(model(body))) == pytest.approx(0.2 / (0.2 + 0.4), abs=0.05)
 
 
 def test_a_thin_plate_round_a_body_is_flange() -> None:
@@ -120,7 +120,7 @@ def test_a_thin_plate_round_a_body_is_flange() -> None:
     # Flange where 1 mm < d/2 and d > 4 mm, and the thick middle is not in the way: from 4 to 100 mm inside.
     outer = (width - 0.008) * (height - 0.008)
     inner = (width - 2 * margin) * (height - 2 * margin)
-    assert flange_share(look(plate)) == pytest.approx((outer - inner) / (width * height), abs=0.01)
+    assert flange_share(front_view(plate)) == pytest.approx((outer - inner) / (width * height), abs=0.01)
 
 
 @pytest.mark.parametrize(("depth", "flat"), [(0.2, True), (0.3, False)])
@@ -130,16 +130,16 @@ def test_what_is_flatter_than_a_quarter_of_round_is_flange(depth: float, flat: b
     # At d from the rim the ellipsoid is depth * 2 sqrt(d (2r - d)) thick, which is less than d/2 only near the middle.
     d = 8 * depth**2 * 2 * 0.1 / (0.5 + 8 * depth**2)
     expected = max(0.0, 1 - d / 0.1) ** 2
-    assert (flange_share(look(model(body))) > 0) == flat
-    assert flange_share(look(model(body))) == pytest.approx(expected, abs=0.02)
+    assert (flange_share(front_view(model(body))) > 0) == flat
+    assert flange_share(front_view(model(body))) == pytest.approx(expected, abs=0.02)
 
 
 def test_walls_of_a_box_a_ball_and_a_shell() -> None:
     plate = thinnest_wall(model(box(0.3, 0.4, 0.012)))
-    assert plate.least_mm == pytest.approx(12, abs=0.01)
+    assert plate.min_mm == pytest.approx(12, abs=0.01)
     assert plate.quantile_mm == pytest.approx(12, abs=0.01)
     # Rays along the normals of flat facets miss the centre by little.
-    assert thinnest_wall(model(ball(0.1))).least_mm == pytest.approx(200, rel=0.01)
+    assert thinnest_wall(model(ball(0.1))).min_mm == pytest.approx(200, rel=0.01)
     cavity = ball(0.08)
     cavity.invert()
     assert thinnest_wall(model(ball(0.1), cavity)).quantile_mm == pytest.approx(20, rel=0.02)
@@ -147,12 +147,12 @@ def test_walls_of_a_box_a_ball_and_a_shell() -> None:
 
 def test_a_neck_between_two_bodies_is_the_thinnest_wall() -> None:
     neck = model(box(0.2, 0.2, 0.2, (0.3, 0, 0)), box(0.2, 0.2, 0.2, (-0.3, 0, 0)), box(0.398, 0.03, 0.2))
-    assert thinnest_wall(neck).least_mm == pytest.approx(30, abs=0.01)
+    assert thinnest_wall(neck).min_mm == pytest.approx(30, abs=0.01)
 
 
 def test_quality_of_triangles_by_formula() -> None:
     def one(points: list[tuple[float, float]]) -> float:
-        return quality(Mesh(np.pad(np.array(points, np.float32), ((0, 0), (0, 1))), np.array([[0, 1, 2]]))).least
+        return quality(Mesh(np.pad(np.array(points, np.float32), ((0, 0), (0, 1))), np.array([[0, 1, 2]]))).minimum
 
     assert one([(0, 0), (1, 0), (0.5, 3**0.5 / 2)]) == pytest.approx(1)
     assert one([(0, 0), (1, 0), (0, 1)]) == pytest.approx(3**0.5 / 2)

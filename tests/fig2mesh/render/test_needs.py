@@ -10,7 +10,7 @@ from fig2mesh.errors import InputError
 from fig2mesh.render.counts import Counts
 from fig2mesh.render.effects import EFFECTS, MODES, Effect, Mode, check_effects, parse_effects
 from fig2mesh.render.needs import Needs, needs
-from fig2mesh.render.picture import Request, render
+from fig2mesh.render.picture import PictureRequest, render
 from fig2mesh.render.scene import FieldScene, MeshScene
 from tests.fig2mesh.render.scenes import balls_mesh, balls_scene
 
@@ -50,7 +50,7 @@ def mesh() -> MeshScene:
 
 
 def spent(scene: FieldScene | MeshScene, mode: Mode, *effects: Effect, ground: bool = False) -> Counts:
-    return render(scene, Request(mode, frozenset(effects), SIZE, pitch_deg=20.0, ground=ground)).counts
+    return render(scene, PictureRequest(mode, frozenset(effects), SIZE, pitch_deg=20.0, ground=ground)).counts
 
 
 @pytest.mark.parametrize("kind", ["fields", "mesh"])

@@ -15,7 +15,7 @@ from fig2mesh.field.camera import axes
 from fig2mesh.parts.smooth_union import smooth_union
 from fig2mesh.render.needs import Needs
 from fig2mesh.render.outline import ink_cover
-from fig2mesh.render.picture import AO_REACH, Request, render, view_of
+from fig2mesh.render.picture import AO_REACH, PictureRequest, render, view_of
 from fig2mesh.render.scene import FieldScene, MeshScene
 from fig2mesh.render.shading import (
     AMBIENT,
@@ -47,7 +47,7 @@ SIDE = 160
 INK = (10, 20, 30)
 
 
-def ball_normals(request: Request, scene: FieldScene, radius: float) -> NDArray[np.float64]:
+def ball_normals(request: PictureRequest, scene: FieldScene, radius: float) -> NDArray[np.float64]:
     """(H, W, 3) normals of a ball about the origin in an orthographic picture; NaN beside it."""
     pixel = view_of(scene, request).camera.height / request.size[1]
     offset = (np.arange(SIDE) + 0.5 - SIDE / 2) * pixel / radius
@@ -60,7 +60,7 @@ def ball_normals(request: Request, scene: FieldScene, radius: float) -> NDArray[
 
 @pytest.mark.parametrize(("yaw", "pitch"), [(0.0, 0.0), (70.0, 25.0)])
 def test_ball_in_a_known_light_is_lambert(yaw: float, pitch: float) -> None:
-    scene, request = ball(), Request("clay", frozenset(["light"]), (SIDE, SIDE), yaw, pitch)
+    scene, request = ball(), PictureRequest("clay", frozenset(["light"]), (SIDE, SIDE), yaw, pitch)
     normals = ball_normals(request, scene, 0.5)
     lamp, fill = key_direction(yaw), fill_direction(yaw)
     light = AMBIENT + FILL * (0.5 + 0.5 * normals @ fill) + KEY * np.maximum(normals @ lamp, 0)
@@ -75,7 +75,7 @@ def test_ball_in_a_known_light_is_lambert(yaw: float, pitch: float) -> None:
 def test_lamp_stays_at_the_viewers_upper_left() -> None:
     """Seen from any yaw the same picture: the lamp comes along."""
     pictures = [
-        render(ball(), Request("clay", frozenset(["light"]), (64, 64), yaw)).rgba.astype(int) for yaw in (0, 130)
+        render(ball(), PictureRequest("clay", frozenset(["light"]), (64, 64), yaw)).rgba.astype(int) for yaw in (0, 130)
     ]
     assert np.abs(pictures[0] - pictures[1]).max() <= 6
     rows, columns = np.nonzero(pictures[0][..., 0] == pictures[0][..., 0].max())
@@ -95,7 +95,7 @@ def test_shadow_of_a_ball_lies_where_geometry_says() -> None:
     scene, radius = ball(0.2), 0.2
     sun = np.array([0.35, 0.9, 0.2])
     sun /= np.linalg.norm(sun)
-    request = Request(
+    request = PictureRequest(
         "clay", frozenset(["sun", "shadow"]), (SIDE, SIDE), pitch_deg=90.0, ground=True, sun=tuple(sun.tolist())
     )
     picture = render(scene, request).rgba
@@ -123,7 +123,7 @@ def test_ambient_occlusion_of_a_plane_is_one_and_of_a_corner_a_half() -> None:
     scene = solid(stair, 2.0, 81)
     # The tread is z > 0, y = -0.5. Seen from above each row of pixels has one distance from the corner.
     size = (120, 120)
-    request = Request("clay", frozenset(["ao"]), size, pitch_deg=90.0)
+    request = PictureRequest("clay", frozenset(["ao"]), size, pitch_deg=90.0)
     bare, shaded = (render(scene, replace(request, effects=effects)).rgba for effects in (frozenset(), request.effects))
     lit_by, unshaded = linear_from_srgb(shaded[..., 0] / 255), linear_from_srgb(bare[..., 0] / 255)
     openness = lit_by / np.maximum(unshaded, 1e-9)
@@ -151,7 +151,7 @@ def test_hemisphere_is_cosine_weighted() -> None:
 
 
 def test_depth_of_a_ball_is_its_formula() -> None:
-    scene, request = ball(), Request("depth", size=(SIDE, SIDE), yaw_deg=40.0)
+    scene, request = ball(), PictureRequest("depth", size=(SIDE, SIDE), yaw_deg=40.0)
     view = view_of(scene, request)
     picture = render(scene, request).rgba
     towards = 0.5 * (ball_normals(request, scene, 0.5) @ axes(40.0)[2])
@@ -166,7 +166,7 @@ def test_depth_of_a_ball_is_its_formula() -> None:
 def test_silhouette_is_orthographic_or_perspective_by_its_law() -> None:
     """A ball of radius r at distance d looks like a disc of r, or of r / sqrt(1 - r²/d²) in the plane of its middle."""
     for effects in (frozenset(), frozenset(["perspective"])):
-        scene, request = ball(), Request("depth", effects, (400, 400))
+        scene, request = ball(), PictureRequest("depth", effects, (400, 400))
         view = view_of(scene, request)
         area = (render(scene, request).rgba[..., 3] == 255).sum() * (view.camera.height / 400) ** 2
         radius = 0.5 / np.sqrt(1 - (0.5 / view.camera.distance) ** 2) if effects else 0.5
@@ -179,7 +179,7 @@ def test_nothing_leaves_the_picture_in_a_turn(nearby: bool, pitch: float) -> Non
     scene = FieldScene(mannequin_body())
     effects = frozenset(["perspective"]) if nearby else frozenset()
     for yaw in (0.0, 60.0, 135.0):
-        alpha = render(scene, Request("depth", effects, (60, 80), yaw, pitch, ground=True)).rgba[..., 3]
+        alpha = render(scene, PictureRequest("depth", effects, (60, 80), yaw, pitch, ground=True)).rgba[..., 3]
         border = np.concatenate([alpha[0], alpha[-1], alpha[:, 0], alpha[:, -1]])
         assert not border.any()
         assert alpha.any()
@@ -187,7 +187,9 @@ def test_nothing_leaves_the_picture_in_a_turn(nearby: bool, pitch: float) -> Non
 
 def test_outline_lies_on_the_silhouette_and_nowhere_else() -> None:
     scene = ball()
-    request = Request("clay", frozenset(["outline"]), (SIDE, SIDE), samples=2, outline_px=3.0, outline_colour=INK)
+    request = PictureRequest(
+        "clay", frozenset(["outline"]), (SIDE, SIDE), samples=2, outline_px=3.0, outline_colour=INK
+    )
     picture = render(scene, request).rgba
     pixel = view_of(scene, request).camera.height / SIDE
     x = (np.arange(SIDE) + 0.5 - SIDE / 2) * pixel
@@ -221,7 +223,9 @@ def inked_columns(cover: NDArray[np.float64]) -> list[int]:
 
 
 def test_bands_make_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
-    request = Request("parts", frozenset(["light", "shadow", "ao"]), (60, 80), pitch_deg=20.0, samples=2, ground=True)
+    request = PictureRequest(
+        "parts", frozenset(["light", "shadow", "ao"]), (60, 80), pitch_deg=20.0, samples=2, ground=True
+    )
     whole = render(balls_scene(), request)
     monkeypatch.setattr("fig2mesh.render.picture.RAYS_AT_ONCE", 2000)
     bands = render(balls_scene(), request)
@@ -230,13 +234,15 @@ def test_bands_make_the_same_picture(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_same_request_gives_same_bytes() -> None:
-    request = Request("textured", frozenset(["light", "shadow", "ao", "outline", "blend"]), (60, 80), 30.0, samples=2)
+    request = PictureRequest(
+        "textured", frozenset(["light", "shadow", "ao", "outline", "blend"]), (60, 80), 30.0, samples=2
+    )
     assert render(balls_scene(), request).rgba.tobytes() == render(balls_scene(), request).rgba.tobytes()
 
 
 def test_fields_take_the_drawing_in_front_and_their_parts_colour_behind() -> None:
     scene = balls_scene()
-    front, back = (render(scene, Request("textured", size=(60, 80), yaw_deg=yaw)).rgba for yaw in (0.0, 180.0))
+    front, back = (render(scene, PictureRequest("textured", size=(60, 80), yaw_deg=yaw)).rgba for yaw in (0.0, 180.0))
     seen = front[..., 3] == 255
     drawn = (front[..., :3] == np.uint8(DRAWN)).all(axis=-1)
     assert drawn[seen].mean() > 0.95
@@ -247,7 +253,7 @@ def test_fields_take_the_drawing_in_front_and_their_parts_colour_behind() -> Non
 def test_blend_is_smooth_where_the_hard_border_jumps() -> None:
     scene = balls_scene()
     hard, soft = (
-        render(scene, Request("textured", effects, (200, 240), yaw_deg=90.0)).rgba.astype(int)
+        render(scene, PictureRequest("textured", effects, (200, 240), yaw_deg=90.0)).rgba.astype(int)
         for effects in (frozenset(), frozenset(["blend"]))
     )
     row = 150
@@ -256,7 +262,7 @@ def test_blend_is_smooth_where_the_hard_border_jumps() -> None:
     assert jump_hard > 150
     assert jump_soft < 12
     # What faces the drawing's viewer, and what is turned away from it, keep their colours.
-    front = render(scene, Request("textured", frozenset(["blend"]), (200, 240))).rgba
+    front = render(scene, PictureRequest("textured", frozenset(["blend"]), (200, 240))).rgba
     assert tuple(front[row, 100, :3]) == tuple(int(v) for v in DRAWN)
 
 
@@ -264,7 +270,7 @@ def test_blend_is_smooth_where_the_hard_border_jumps() -> None:
 def test_fields_and_their_mesh_look_alike(mode: str) -> None:
     body = mannequin_body()
     effects = frozenset(["light", "shadow", "ao"]) if mode == "clay" else frozenset()
-    request = Request(mode, effects, (150, 200), 35.0, 10.0, samples=2, ground=True)  # type: ignore[arg-type]
+    request = PictureRequest(mode, effects, (150, 200), 35.0, 10.0, samples=2, ground=True)  # type: ignore[arg-type]
     first, second = (render(scene, request).rgba for scene in (FieldScene(body), MeshScene(mesh_of(body, 0.008))))
     alpha = [picture[..., 3] >= 128 for picture in (first, second)]
     assert (alpha[0] & alpha[1]).sum() / (alpha[0] | alpha[1]).sum() > 0.99
@@ -273,7 +279,7 @@ def test_fields_and_their_mesh_look_alike(mode: str) -> None:
 
 def test_mesh_of_any_size_makes_the_same_picture() -> None:
     mesh = balls_mesh()
-    request = Request("clay", frozenset(["light", "shadow", "ao"]), (60, 80), pitch_deg=20.0, ground=True)
+    request = PictureRequest("clay", frozenset(["light", "shadow", "ao"]), (60, 80), pitch_deg=20.0, ground=True)
     small, large = (
         render(MeshScene(replace(mesh, vertices=mesh.vertices * scale)), request).rgba.astype(int)
         for scale in (1e-3, 1e4)
@@ -283,13 +289,13 @@ def test_mesh_of_any_size_makes_the_same_picture() -> None:
 
 def test_parts_have_their_colours() -> None:
     for scene in (balls_scene(), MeshScene(balls_mesh())):
-        picture = render(scene, Request("parts", size=(60, 80))).rgba
+        picture = render(scene, PictureRequest("parts", size=(60, 80))).rgba
         colours = {tuple(c) for c in picture[picture[..., 3] == 255][:, :3].tolist()}
         assert colours == {PART_COLOURS[TORSO], PART_COLOURS[HEAD]}
 
 
 def test_background_is_behind_and_transparent_unless_asked_for() -> None:
-    bare, paper = (render(ball(), Request("clay", size=(64, 64), background=c)).rgba for c in (None, (9, 8, 7)))
+    bare, paper = (render(ball(), PictureRequest("clay", size=(64, 64), background=c)).rgba for c in (None, (9, 8, 7)))
     outside = bare[..., 3] == 0
     assert outside.any()
     assert (paper[outside] == (9, 8, 7, 255)).all()
@@ -302,7 +308,7 @@ def test_smooth_union_rounds_creases_and_leaves_the_rest() -> None:
     assert len(round_.fillets) == 1
     # The ring where the balls cross lies inside of the smooth union now; far from it nothing has changed.
     scene = FieldScene(body)
-    camera = view_of(scene, Request("depth", size=(120, 160))).camera
+    camera = view_of(scene, PictureRequest("depth", size=(120, 160))).camera
     hits = [s.meet(camera, (0, 160), Needs(normals=True))[0] for s in (scene, FieldScene(round_))]
     both = np.isfinite(hits[0].depth) & np.isfinite(hits[1].depth)
     gain = hits[0].depth[both] - hits[1].depth[both]
@@ -329,7 +335,9 @@ def test_smooth_union_keeps_the_drawn_contour() -> None:
     drawn = assemble(Sketch(**joints).legs().arms(width=26).trunk().head().figure())
     round_ = smooth_union(drawn.body, drawn.outline.canvas)
     assert len(round_.fillets) > len(drawn.body.fillets)
-    bare, grown = (render(FieldScene(body), Request("depth", size=(240, 320))).rgba for body in (drawn.body, round_))
+    bare, grown = (
+        render(FieldScene(body), PictureRequest("depth", size=(240, 320))).rgba for body in (drawn.body, round_)
+    )
     more = (bare[..., 3] != grown[..., 3]).sum() / (bare[..., 3] > 0).sum()
     assert more < 0.003
     assert (bare[..., 0] != grown[..., 0]).any()

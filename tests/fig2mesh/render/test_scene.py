@@ -9,7 +9,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.field.trace import trace
 from fig2mesh.parts.smooth_union import smooth_union
 from fig2mesh.render.needs import Needs
-from fig2mesh.render.picture import Request, view_of
+from fig2mesh.render.picture import PictureRequest, view_of
 from fig2mesh.render.scene import FieldScene
 from tests.drawn import Sketch, assemble
 
@@ -30,7 +30,7 @@ def test_fields_are_met_where_single_rays_meet_them(scene: FieldScene, nearby: b
     """Rays of frames are reckoned in double precision, those of `trace` are single: they differ by a millionth of the
     distance, and hits by the march's tolerance. A ray that grazes the rim may meet the figure or not."""
     effects = frozenset(["perspective"]) if nearby else frozenset()
-    camera = view_of(scene, Request("depth", effects, SIZE, yaw, pitch)).camera
+    camera = view_of(scene, PictureRequest("depth", effects, SIZE, yaw, pitch)).camera
     rows = (60, 300)
     surface, counts = scene.meet(camera, rows, EVERYTHING)
     hits = trace(scene.body, camera.rays(rows))

@@ -16,7 +16,7 @@ from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.texture.pen import Pen
 from fig2mesh.texture.sources import Sources
 from fig2mesh.view.page import view_page
-from fig2mesh.view.scene import Scene, make_scene
+from fig2mesh.view.scene import ViewScene, make_scene
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Painted:
     body: Body
     sources: Sources
     frame: ImageFrame
-    scene: Scene
+    scene: ViewScene
 
 
 @pytest.fixture(scope="session")

@@ -60,7 +60,7 @@ def test_values_that_overestimate_are_tamed_and_keep_their_sign() -> None:
     (brick,) = field_atlas(Body((wild,))).bricks
     assert lipschitz(wild.grid, wild.spacing) > 1000
     # Across the surface the solid's own slope, which is 1, comes on top.
-    assert brick.slope <= (1 + fields.STEEPEST) * 3**0.5
+    assert brick.slope <= (1 + fields.MAX_STEP) * 3**0.5
     tame = values_at(brick, np.argwhere(np.ones_like(ball.grid)) * ball.spacing + ball.origin).reshape(ball.grid.shape)
     inner = (np.abs(np.indices(ball.grid.shape) - 23.5) < 15).all(axis=0)
     assert ((tame > 0) == (wild.grid > 0))[inner].all()
@@ -87,7 +87,7 @@ def test_specks_beside_a_part_are_left_out() -> None:
 def test_too_many_voxels_are_resampled(monkeypatch: pytest.MonkeyPatch) -> None:
     body = Body(mannequin(64))
     full = len(field_atlas(body).values())
-    monkeypatch.setattr(fields, "MOST_VOXELS", full // 4)
+    monkeypatch.setattr(fields, "MAX_VOXELS", full // 4)
     coarse = field_atlas(body)
     assert len(coarse.values()) < 0.3 * full
     random = np.random.default_rng(1)

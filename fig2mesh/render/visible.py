@@ -1,4 +1,4 @@
-"""Points that a picture shows: of the figure, and of the ground below it."""
+"""Visible points of a picture: of the figure, and of the ground below it."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from fig2mesh.field.camera import Camera
 from fig2mesh.render.counts import Counts
 from fig2mesh.render.needs import Needs
-from fig2mesh.render.scene import Floats, Scene, Surface
+from fig2mesh.render.scene import Floats, Scene, SurfaceHits
 from fig2mesh.render.view import ground_radius
 
 UP = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
-class Seen:
-    """M points seen by the pixels of some rows of a picture, in the order of the pixels.
+class VisiblePoints:
+    """M points visible in some rows of a picture, in the order of the pixels.
 
-    camera : of the whole picture; rows : the first, and the first of those that follow
-    surface : what of the figure is met
-    pixels : (M,) that see something, counted from the first of `rows`
+    camera : of the whole picture; rows : first, and one past the last
+    surface : hits on the figure
+    pixels : (M,) indices of the pixels that show them, counted from the first of `rows`
     ground : (M,) bool, on the ground; the others lie on the figure
     depth : (M,) along the rays
     points, normals : (M, 3), or (0, 3) where they are not needed
@@ -30,7 +30,7 @@ class Seen:
 
     camera: Camera
     rows: tuple[int, int]
-    surface: Surface
+    surface: SurfaceHits
     pixels: NDArray[np.intp]
     ground: NDArray[np.bool_]
     depth: Floats
@@ -48,10 +48,10 @@ class Seen:
         return self.rows[1] - self.rows[0], self.camera.size[0]
 
 
-def look(
+def visible_points(
     scene: Scene, camera: Camera, rows: tuple[int, int], needs: Needs, *, with_ground: bool
-) -> tuple[Seen, Counts]:
-    """The figure and, if asked for, the ground, as a camera sees them."""
+) -> tuple[VisiblePoints, Counts]:
+    """Points of the figure and, if requested, of the ground that are visible to a camera."""
     surface, counts = scene.meet(camera, rows, needs)
     depth = surface.depth.astype(np.float64)
     hit = np.isfinite(depth)
@@ -68,7 +68,7 @@ def look(
             points = _merged(ground, origins + depth[ground, None] * directions, points)
         if needs.normals:
             normals = _merged(ground, UP, normals)
-    return Seen(camera, rows, surface, pixels, ground, depth, points, normals), counts
+    return VisiblePoints(camera, rows, surface, pixels, ground, depth, points, normals), counts
 
 
 def to_ground(origins: Floats, directions: Floats, bounds: Floats) -> Floats:
