@@ -18,8 +18,8 @@ from exporters.asset import FloatArray, IntArray, TexturedMesh
 
 
 @dataclass(frozen=True)
-class Solid:
-    """The unsplit surface of a mesh.
+class WeldedMesh:
+    """A mesh with the vertices joined that texture seams have split.
 
     first : (S,) int64, for each solid vertex its first mesh vertex
     faces : (F, 3) int32 into the S solid vertices
@@ -31,10 +31,10 @@ class Solid:
     vertex: NDArray[np.int64]
 
 
-def solid_of(mesh: TexturedMesh) -> Solid:
+def solid_of(mesh: TexturedMesh) -> WeldedMesh:
     """Return the solid described by `mesh.solid_index`, its vertices numbered consecutively."""
     _, first, vertex = np.unique(mesh.solid_index, return_index=True, return_inverse=True)
-    return Solid(first, vertex[mesh.faces].astype(np.int32), vertex)
+    return WeldedMesh(first, vertex[mesh.faces].astype(np.int32), vertex)
 
 
 def merged_by_position(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDArray[Any], IntArray]:

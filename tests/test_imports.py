@@ -169,3 +169,12 @@ def test_no_crowds():
     counts = {path.relative_to(ROOT).as_posix(): len(list(path.glob("*.py"))) for path in folders}
     assert len(list((ROOT / "fig2mesh").glob("*.py"))) <= 10
     assert all(count <= 27 for count in counts.values()), counts
+
+
+def test_classes_have_names_of_their_own():
+    found: dict[str, list[str]] = {}
+    for name, path in modules().items():
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(name)
+    assert not {name: places for name, places in found.items() if len(places) > 1}
