@@ -34,13 +34,13 @@ Report = Callable[[str], None]
 
 # fmt: off
 BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
-    "as the main job bakes them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
+    "as conversions bake them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
     "coordinates, refined", "coordinates",
 )
 # fmt: on
 # fmt: off
 STRAIGHT, NEAREST, INPAINTED = (
-    "straight through the body", "nearest seen point", "OpenCV inpainting in texture space",
+    "straight through the body", "nearest observed point", "OpenCV inpainting in texture space",
 )
 # fmt: on
 METHODS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
@@ -235,7 +235,10 @@ def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
             rows.append((title, *(cell for m in means for cell in (f"{m[0]:.2f}", f"{m[1]:.3f}", f"{m[2]:.2f}"))))
             if method in PLACED:
                 faces.append((title, *(f"{100 * share:.1f}" for share in np.nanmean(shares, axis=0))))
-    head = ["way", *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette"))]
+    head = [
+        "method",
+        *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette")),
+    ]
     text = (
         f"{bodies} bodies a split; means over pictures of 256 x 256 pixels, inside of the body. Palette: mean distance "
         "to the nearest colour of the other picture, CIELAB units, both ways."
@@ -244,4 +247,4 @@ def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
         "Percent of the back of heads that shows what the drawing has between brows and chin, skin included; and as far"
         " as the truth has another colour there:"
     )
-    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('way', 'face', 'face, wrongly'), faces)}"
+    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('method', 'face', 'face, wrongly'), faces)}"
