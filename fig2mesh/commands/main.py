@@ -83,6 +83,8 @@ class MainJobGroup(click.Group):
         sections["Messages"] = [name for name in options if name not in grouped]
         for title, names in sections.items():
             records = [record for name in names if name in options and (record := options[name].get_help_record(ctx))]
+            if title == "Messages":
+                records.append(("--version", "Show the version and exit."))
             with formatter.section(title):
                 formatter.write_dl(records)
         self.format_commands(ctx, formatter)
@@ -97,8 +99,8 @@ class MainJobGroup(click.Group):
 def cli() -> None:
     """Turn one drawn human figure into a closed, textured, georeferenced 3D model.
 
-    FIGURE is a picture of one figure. Its silhouette is the alpha channel or --mask, its joints are --keypoints;
-    anything missing is inferred from the picture.
+    FIGURE is a picture of one figure. The silhouette comes from --mask or the alpha channel, the
+    joints from --keypoints; anything missing is inferred from the picture.
     """
 
 

@@ -36,13 +36,13 @@ class TilesetRequest:
 
 
 @click.command()
-@click.argument("assets", type=FILE, nargs=-1, required=True, metavar="ASSET...")
+@click.argument("assets", type=FILE, nargs=-1, required=True, metavar="MODEL...")
 @request_options(TilesetRequest)
 @messages
 def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verbose: int) -> None:
     """Gather placed figures into one 3D Tiles tileset, as a spatial tree.
 
-    ASSET is a .glb made with --lonlat or --map, the tileset of a figure (with its levels of detail), or a folder that
+    MODEL is a .glb made with --lonlat or --map, the tileset of a figure (with its levels of detail), or a folder that
     contains such files at any depth. Also writes index.geojson, a map of the figures, and figures.czml, in which they
     stand on the terrain.
     """
