@@ -13,7 +13,8 @@ import json
 import sys
 from pathlib import Path
 
-from fig2mesh.commands.main import main
+from fig2mesh.batch.job import run as run_batch
+from fig2mesh.batch.request import BatchRequest
 
 EXAMPLES = Path(__file__).resolve().parent
 MAP = EXAMPLES / "maps" / "lake_zurich"
@@ -21,26 +22,18 @@ MAP = EXAMPLES / "maps" / "lake_zurich"
 
 def run(out_dir: Path, quality: str = "standard", formats: tuple[str, ...] = ("usdc",)) -> list[Path]:
     """Convert the figures on the map; return the files made, one a figure and format, and the tileset of all."""
-    out_dir = Path(out_dir)
-    words = [
-        "batch",
+    request = BatchRequest(
         MAP / "figures.csv",
-        "-o",
-        out_dir,
-        "--root",
-        EXAMPLES,
-        "--quality",
-        quality,
-        "--credit",
-        "fig2mesh authors, MIT",
-        "--title",
-        "Around Lake Zürich",
-        *(word for suffix in formats for word in ("--format", suffix)),
-    ]
-    if code := main([str(word) for word in words]):
+        output=Path(out_dir),
+        root=EXAMPLES,
+        formats=formats,
+        title="Around Lake Zürich",
+        defaults={"quality": quality, "credit": "fig2mesh authors, MIT"},
+    )
+    if code := run_batch(request):
         raise SystemExit(code)
-    rows = map(json.loads, (out_dir / "manifest.jsonl").read_text(encoding="utf-8").splitlines())
-    return [*(out_dir / name for row in rows for name in row["outputs"]), out_dir / "tileset.json"]
+    rows = map(json.loads, (Path(out_dir) / "manifest.jsonl").read_text(encoding="utf-8").splitlines())
+    return [*(Path(out_dir) / name for row in rows for name in row["outputs"]), Path(out_dir) / "tileset.json"]
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""What exporters receive: a textured mesh, its coarser versions and its place.
+"""Input of the exporters: a textured mesh, its levels of detail and its placement.
 
 Arrays are in the ASSET frame (see `georef.frames`): metres, +Y up, front +Z, origin on the ground between the
-feet. Records are frozen and their arrays read-only, so that a writer cannot change what the next one receives.
+feet. Records are frozen and their arrays read-only, so that a writer cannot change the input of the next one.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ ByteArray = NDArray[np.uint8]
 
 
 def frozen_array(array: Any, dtype: Any, shape: tuple[int | None, ...], name: str, finite: bool = True) -> NDArray[Any]:
-    """A read-only, C-ordered copy of `array`, checked against `shape` (None: any length) and, if asked, for NaN."""
+    """Return a read-only, C-ordered copy of `array`, checked against `shape` (None: any length)."""
     result = np.array(array, dtype=dtype, order="C", copy=True)
     matches = len(shape) == result.ndim and all(
-        want is None or want == have for want, have in zip(shape, result.shape, strict=True)
+        expected is None or expected == actual for expected, actual in zip(shape, result.shape, strict=True)
     )
     if not matches:
         raise ValueError(f"{name}: shape is {result.shape}, expected {shape}")
@@ -68,13 +68,13 @@ class TexturedMesh:
 
     vertices : (V, 3) float32, ASSET, metres
     faces : (F, 3) int32, counter-clockwise seen from outside
-    normals : (V, 3) float32, unit length; None: nothing is to be lit
+    normals : (V, 3) float32, unit length; None: the mesh is unlit
     uv : (V, 2) float32 in [0, 1], v = 0 at image row 0 (the glTF convention); None: untextured
     texture : colours; None: untextured
-    observed : one-channel texture, 255 where the drawing itself showed the surface, 0 where it is inferred
+    observed : one-channel texture, 255 where the drawing shows the surface, 0 where it is inferred
     colors : (V, 3) uint8 sRGB vertex colours (for formats without textures)
     parts : (V,) uint8 part label per vertex (`fig2mesh.skeleton.PART_NAMES`), 0 none
-    solid_index : (V,) int32, the vertex of the unsplit solid that each vertex came from: faces mapped through it
+    solid_index : (V,) int32, the vertex of the unsplit solid for each vertex: faces mapped through it
         form a closed, oriented, manifold surface
     deviation_m : measured mean and maximum distance to the surface before simplification, metres
     """
@@ -91,19 +91,19 @@ class TexturedMesh:
     deviation_m: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        def put(name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:
+        def freeze(name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, frozen_array(value, dtype, shape, name))
 
-        put("vertices", np.float32, (None, 3))
-        put("faces", np.int32, (None, 3))
+        freeze("vertices", np.float32, (None, 3))
+        freeze("faces", np.int32, (None, 3))
         count = len(self.vertices)
-        put("normals", np.float32, (count, 3))
-        put("solid_index", np.int32, (count,))
-        put("uv", np.float32, (count, 2))
-        put("colors", np.uint8, (count, 3))
-        put("parts", np.uint8, (count,))
+        freeze("normals", np.float32, (count, 3))
+        freeze("solid_index", np.int32, (count,))
+        freeze("uv", np.float32, (count, 2))
+        freeze("colors", np.uint8, (count, 3))
+        freeze("parts", np.uint8, (count,))
         if len(self.faces) and (self.faces.min() < 0 or self.faces.max() >= count):
             raise ValueError(f"faces: index {int(self.faces.max())} outside the {count} vertices")
         if self.texture is not None and self.uv is None:
@@ -111,7 +111,7 @@ class TexturedMesh:
 
     @property
     def shading_normals(self) -> FloatArray:
-        """(V, 3) float32 `normals`, or those of the triangles weighted by area where there are none."""
+        """(V, 3) float32 `normals`, or area-weighted vertex normals where there are none."""
         if self.normals is not None:
             return self.normals
         corners = self.vertices.astype(np.float64)[self.faces]
@@ -130,14 +130,14 @@ class TexturedMesh:
 
 @dataclass(frozen=True)
 class Asset:
-    """One figure ready to be written.
+    """One figure ready for the writers.
 
     name : identifier, used for node, prim and file names
     lods : finest first; at least one
-    placement : where it stands; None: nowhere (local use)
+    placement : its place on the earth; None: not georeferenced
     part_names : label → name for the labels that occur in `TexturedMesh.parts`
     copyright : attribution line, may be empty
-    lit : whether clients light the surface or show its colours as they are (formats that know the difference)
+    lit : True: clients shade the surface; False: they show its colours unlit, in formats that support it
     metadata : JSON-serialisable facts about the figure (source, seed, version, observed share ...)
     """
 

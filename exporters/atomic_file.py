@@ -1,8 +1,8 @@
-"""Files and folders that appear whole or not at all.
+"""Atomic writing of files and folders.
 
-Everything is written into a temporary folder beside its target and renamed into place when it is finished: only a
-rename within one file system is atomic. What goes wrong before that leaves the disk as it was. A process that is
-killed leaves its temporary folder behind; `sweep_temporary` removes it.
+Everything is written into a temporary folder next to its target and renamed into place when it is complete: only a
+rename within one file system is atomic. Errors before that leave the disk unchanged. A process that is killed leaves
+its temporary folder behind; `sweep_temporary` removes it.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from typing import Final, TextIO
 from exporters.errors import ExportError
 
 TEMPORARY: Final = ".fig2mesh-*.tmp"
-"""Names of temporary folders, as a pattern of `glob`; each has the name of its process and a random one in it."""
+"""Glob pattern of the names of temporary folders, which contain the process id and a random token."""
 
 _IN_PATHS: Final = re.compile(re.escape(TEMPORARY).replace(r"\*", r"\w+-\w+") + "/")
 
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A path to write a file to, which becomes `path` when the body ends and goes where it fails.
+    """Give a path to write a file to, which becomes `path` when the body ends and is removed if it fails.
 
-    It has the name of the file, as writers choose a format by its suffix, and is in a folder that is there already.
-    Raises OSError where the disk refuses.
+    It has the name of the file, as writers choose a format by its suffix, and is in an existing folder.
+    Raises OSError where it cannot be written.
     """
     with _temporary_folder(path.parent) as stage:
         yield stage / path.name
@@ -38,31 +38,31 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_text(path: Path) -> Iterator[TextIO]:
-    """A stream of UTF-8 text, its lines ended by LF, that becomes the file `path` when the body ends."""
+    """Open a stream of UTF-8 text with LF line ends, which becomes the file `path` when the body ends."""
     with atomic_path(path) as partial, partial.open("w", encoding="utf-8", newline="\n") as stream:
         yield stream
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all. Raises OSError where the disk refuses."""
+    """Write a file atomically. Raises OSError where it cannot be written."""
     with atomic_path(path) as partial:
         partial.write_bytes(content)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file of UTF-8 text as it is, whole or not at all. Raises OSError where the disk refuses."""
+    """Write a text as UTF-8 atomically, without newline conversion. Raises OSError where it cannot be written."""
     write_bytes(path, text.encode())
 
 
 @contextmanager
 def atomic_folder(folder: Path) -> Iterator[Path]:
-    """An empty folder that replaces `folder`, with all that is in it, when the body ends, and goes where it fails.
+    """Give an empty folder that replaces `folder` and its contents when the body ends, and is removed if it fails.
 
-    Raises OSError where the disk refuses.
+    Raises OSError where it cannot be written.
     """
     folder.parent.mkdir(parents=True, exist_ok=True)
     with _temporary_folder(folder.parent) as stage:
-        # No temporary folder by its name: a process killed between the two renames leaves the only copy here.
+        # Not named as a temporary folder: a process killed between the two renames leaves the only copy here.
         old = stage.with_suffix(".old")
         try:
             yield stage
@@ -83,14 +83,14 @@ def write_whole(
     overwrite: bool,
     outdated: Iterable[str] = (),
 ) -> tuple[Path, ...]:
-    """Put the files that `fill` makes in a folder beside `main`, all of them or none; `main` comes last.
+    """Write the files that `fill` makes into the folder of `main`, all of them or none; `main` is renamed last.
 
-    path : the output as it was asked for, for messages
-    fill : writes into the (empty) folder that it is given, a file of `main`'s name among others, folders too
-    outdated : files beside `main`, slashes between folders, that go where `fill` makes none of their name
+    path : the output as given by the user, for messages
+    fill : writes files and folders into the empty folder that it is given, among them a file of `main`'s name
+    outdated : files in the folder of `main`, with slashes, that are removed unless `fill` makes them again
     returns : the files written
 
-    Raises ExportError where the disk refuses, or a file is there already although `overwrite` is off.
+    Raises ExportError where they cannot be written, or a file exists although `overwrite` is off.
     """
     try:
         with _folders(main.parent), _temporary_folder(main.parent) as stage:
@@ -105,22 +105,22 @@ def write_whole(
 
 
 def sweep_temporary(folder: Path, below: bool = False) -> None:
-    """Remove what killed processes had not put in place; no other process may be writing there.
+    """Remove temporary folders that killed processes left behind; no other process may be writing there.
 
-    below : also in the folders of the folder, however deep
+    below : also in subfolders at any depth
     """
     for stale in list(folder.rglob(TEMPORARY) if below else folder.glob(TEMPORARY)):
         shutil.rmtree(stale, ignore_errors=True)
 
 
 def without_temporary(message: str) -> str:
-    """A message with the paths that files get instead of those that they are written to."""
+    """Replace temporary paths in a message by the final ones."""
     return _IN_PATHS.sub("", message)
 
 
 @contextmanager
 def _folders(folder: Path) -> Iterator[None]:
-    """Make a folder and the ones above it; take them away again if the body fails."""
+    """Make a folder and its parents; remove them again if the body fails."""
     absolute = Path(os.path.abspath(folder))
     missing = [each for each in (absolute, *absolute.parents) if not each.exists()]
     try:
@@ -131,14 +131,14 @@ def _folders(folder: Path) -> Iterator[None]:
             try:
                 each.rmdir()
             except OSError:
-                break  # someone else has put something in: it stays
+                break  # not empty: another process has written to it
         raise
 
 
 @contextmanager
 def _temporary_folder(parent: Path) -> Iterator[Path]:
-    # Not from tempfile: its folders are private to the user, and the files' permissions should be those that the
-    # user's umask gives.
+    # Not from tempfile: its folders are private to the user, and the files' permissions should follow the user's
+    # umask.
     stage = parent / TEMPORARY.replace("*", f"{os.getpid()}-{secrets.token_hex(4)}")
     stage.mkdir()
     try:
@@ -148,8 +148,8 @@ def _temporary_folder(parent: Path) -> Iterator[Path]:
 
 
 def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool, outdated: list[str]) -> None:
-    """Rename staged files into their folder in this order, or leave the folder as it was."""
-    # Hidden, so that it is no folder of an output.
+    """Rename staged files into their folder in this order, or leave the folder unchanged."""
+    # Hidden, so that it does not clash with a folder of the output.
     backup = stage / ".replaced"
     kept, new, made = [], [], []
     try:
@@ -161,8 +161,8 @@ def _put_in_place(stage: Path, folder: Path, names: list[str], overwrite: bool, 
                     made.append(folder / parent)
             if target.exists():
                 if not overwrite and target.read_bytes() != (stage / name).read_bytes():
-                    # Equal bytes are no conflict: .gltf and .obj of one figure share their texture.
-                    raise ExportError(target, "exists already", "use --overwrite or choose another name")
+                    # Equal bytes are not a conflict: .gltf and .obj of one figure share their texture.
+                    raise ExportError(target, "already exists", "use --overwrite or choose another name")
                 _keep(target, backup / name)
                 kept.append(name)
             else:

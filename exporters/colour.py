@@ -1,4 +1,4 @@
-"""The transfer curve of sRGB (IEC 61966-2-1): colours are stored on it, and light adds up off it."""
+"""Transfer function of sRGB (IEC 61966-2-1): colours are stored encoded, and light is added up in linear values."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 
 def linear_from_srgb(srgb: NDArray[np.floating[Any]]) -> NDArray[Any]:
-    """Linear light of sRGB values, both 0-1 and of any shape; nothing is rounded."""
+    """Decode sRGB values to linear light, both 0-1 and of any shape, without rounding."""
     return np.asarray(np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4))
 
 
 def srgb_from_linear(linear: NDArray[np.floating[Any]]) -> NDArray[Any]:
-    """sRGB values of linear light, both 0-1 and of any shape; nothing is rounded."""
+    """Encode linear light as sRGB values, both 0-1 and of any shape, without rounding."""
     return np.asarray(np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055))

@@ -1,4 +1,4 @@
-"""Errors of the writers and readers whose cause is the user's input or disk."""
+"""Errors of the writers and readers caused by the user's input or disk."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from georef.errors import InputError
 
 
 class ExportError(InputError):
-    """An output that cannot be written, or a file that cannot be read back: names it, the finding and the remedy."""
+    """An output that cannot be written, or a file that cannot be read."""

@@ -1,4 +1,4 @@
-"""Facts that are found the same way in files of all formats."""
+"""Facts that are determined the same way for files of all formats."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from exporters.solid import measure_topology
-from georef.untrusted.json_file import is_there
+from georef.untrusted.json_file import is_plain_file
 
 
 def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
@@ -30,5 +30,5 @@ def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
 
 
 def file_sizes(*paths: Path) -> dict[str, int]:
-    """Bytes of the files that are there, by name."""
-    return {path.name: path.stat().st_size for path in paths if is_there(path)}
+    """Sizes in bytes of the files that exist, by name."""
+    return {path.name: path.stat().st_size for path in paths if is_plain_file(path)}

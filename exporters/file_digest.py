@@ -1,4 +1,4 @@
-"""The digest by which a file's bytes are known."""
+"""Digests of files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from pathlib import Path
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, hexadecimal; read in blocks. Raises OSError."""
+    """Return the SHA-256 of a file, hexadecimal; read in blocks. Raises OSError."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,4 +1,4 @@
-"""The place of a figure as plain data, for formats that have no field for it, and back from what a file says."""
+"""Placement of a figure as plain data for formats without a field for it, and parsing of such records."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from georef.geodesy import geodetic_from_ecef, nose_bearing_deg
 from georef.placement import GeoPlacement
 from georef.transform import Transform
 from georef.untrusted.damage import DamagedFile, decoding
-from georef.untrusted.json_shape import NUMBER, Needed, Numbers, check_shape
+from georef.untrusted.json_shape import NUMBER, Numbers, Required, check_shape
 
 RECORD = {
-    "crs": Needed(str),
-    "lon_deg": Needed(NUMBER),
-    "lat_deg": Needed(NUMBER),
+    "crs": Required(str),
+    "lon_deg": Required(NUMBER),
+    "lat_deg": Required(NUMBER),
     "height_m": NUMBER,
     "height_datum": str,
     "heading_deg": NUMBER,
     "figure_height_m": NUMBER,
     "altitude_mode": str,
 }
-"""The record of a place."""
+"""Shape of the record of a placement."""
 
 
 def georeference(placement: GeoPlacement) -> dict[str, Any]:
-    """JSON-serialisable record of a placement; `height_m` is above the ellipsoid of WGS 84 (EPSG:4979)."""
+    """Return a JSON-serialisable record of a placement; `height_m` is above the ellipsoid of WGS 84 (EPSG:4979)."""
     return {
         "crs": "EPSG:4979",
         "lon_deg": placement.lon_deg,
@@ -43,15 +43,15 @@ def georeference(placement: GeoPlacement) -> dict[str, Any]:
 
 
 def placement_of_record(record: Mapping[str, Any]) -> GeoPlacement:
-    """The placement that `georeference` made a record of, as read back from a file.
+    """Parse the record of a placement that `georeference` made.
 
-    Raises DamagedFile for a record of another kind or with values that no placement has.
+    Raises DamagedFile for a record of another kind or with invalid values.
     """
     check_shape(record, RECORD, "georeference: ")
     if record["crs"] != "EPSG:4979":
         raise DamagedFile(f"georeference: crs is {record['crs']!r}, expected EPSG:4979")
     if unknown := record.keys() - RECORD.keys():
-        raise DamagedFile(f"georeference: {sorted(unknown)[0][:40]} is not of a place")
+        raise DamagedFile(f"georeference: {sorted(unknown)[0][:40]} is not a member of the record of a place")
     try:
         return GeoPlacement(**{name: value for name, value in record.items() if name != "crs"})
     except PlacementError as error:
@@ -59,14 +59,14 @@ def placement_of_record(record: Mapping[str, Any]) -> GeoPlacement:
 
 
 def placement_of_tile(transform: list[float]) -> dict[str, float]:
-    """Longitude, latitude, ellipsoidal height and nose bearing that a tile transform gives a figure.
+    """Longitude, latitude, ellipsoidal height and nose bearing of a figure from its tile transform.
 
     transform : 16 numbers, column by column, ECEF from TILE, as in a tileset
-    Raises DamagedFile for what is no such transform.
+    Raises DamagedFile for any other transform.
     """
     check_shape(transform, Numbers(16), "transform")
     matrix = np.asarray(transform, dtype=np.float64).reshape(4, 4).T
-    with decoding("transform", PlacementError, ValueError):  # of matrices that are not affine, or not upright
+    with decoding("transform", PlacementError, ValueError):  # for matrices that are not affine, or not upright
         ecef_from_tile = Transform(ECEF, TILE, matrix)
         lon, lat, height = geodetic_from_ecef(matrix[:3, 3]).tolist()
         bearing = nose_bearing_deg(ecef_from_tile)

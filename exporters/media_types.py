@@ -1,4 +1,4 @@
-"""What a file is, by the end of its name: media type, a title for people, and its role in a catalogue."""
+"""Media types by file suffix, with a title for people and the role in a catalogue."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from typing import NamedTuple
 
 
 class MediaType(NamedTuple):
-    """type : as registered with IANA where it is, https://www.iana.org/assignments/media-types; title : for people;
-    role : "data", "metadata", "texture" or "source", see the STAC specification for the first two."""
+    """Media type of a file.
+
+    type : as registered with IANA, if it is, https://www.iana.org/assignments/media-types; title : for people;
+    role : "data", "metadata", "texture" or "source", see the STAC specification for the first two
+    """
 
     type: str
     title: str
@@ -50,7 +53,7 @@ TILESET = MediaType("application/json", "3D Tiles", "data")
 
 
 def media_type(path: str) -> MediaType:
-    """Of a path with slashes; `tileset.json` is 3D Tiles, a picture called texture a texture, the rest by suffix."""
+    """Return the media type of a path with slashes: `tileset.json` is 3D Tiles, pictures named texture are textures."""
     name = PurePosixPath(path)
     if name.name == "tileset.json":
         return TILESET

@@ -1,4 +1,4 @@
-"""Optional npm packages: found where a user put them, never installed by us."""
+"""Lookup of optional npm packages, which are never installed automatically."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from pathlib import Path
 
 
 def find_package(name: str) -> tuple[str, Path] | None:
-    """Node.js and the folder of an npm package: in NODE_PATH, or in node_modules or build/node/node_modules here or
-    in a folder above. None where either is missing."""
+    """Find Node.js and the folder of an npm package; None where either is missing.
+
+    Searched are NODE_PATH, then node_modules and build/node/node_modules in the working directory and its parents.
+    """
     node = shutil.which("node")
     here = Path.cwd()
     places = [Path(entry) for entry in os.environ.get("NODE_PATH", "").split(os.pathsep) if entry]

@@ -1,9 +1,9 @@
-"""Wavefront OBJ with its material library and texture beside it.
+"""Writer of Wavefront OBJ with its material library and texture.
 
 http://paulbourke.net/dataformats/obj/  http://paulbourke.net/dataformats/mtl/
 
-OBJ indexes positions, texture coordinates and normals apart, so positions are those of the unsplit solid: the file
-is closed by its indices alone although its texture has seams.
+OBJ indexes positions, texture coordinates and normals separately, so positions are those of the unsplit solid: the
+file is closed by its indices alone although its texture has seams.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from exporters.solid import solid_of, unit_normals
 
 
 def write_obj(asset: Asset, path: Path | str) -> None:
-    """Write the finest level of detail as .obj, if textured with `<stem>.mtl` and `<stem>_texture.png` beside it.
+    """Write the finest level of detail as .obj, if textured with `<stem>.mtl` and `<stem>_texture.png` next to it.
 
-    asset : vertices in the ASSET frame (y up, metres); written with the digits that give the same float32 back
-    path : the .obj file, replaced if it exists, as are the files beside it
+    asset : vertices in the ASSET frame (y up, metres); written with enough digits to restore the same float32
+    path : the .obj file, replaced if it exists, as are the files next to it
     """
     path = Path(path)
     mesh, solid = asset.mesh, solid_of(asset.mesh)
@@ -41,7 +41,7 @@ def write_obj(asset: Asset, path: Path | str) -> None:
     positions: NDArray[np.floating] = mesh.vertices[solid.first]
     colors = vertex_colors(mesh) if mesh.texture is None else None
     if colors is not None:
-        # The common extension "v x y z r g b". No material beside it, as readers take a white one for the colour.
+        # The common extension "v x y z r g b". Without a material, as readers would use its white as the colour.
         positions = np.hstack([positions, (colors[solid.first] / 255.0).astype(np.float32)])
     corners = np.stack([solid.faces, mesh.faces, mesh.faces], axis=2) + 1
     blocks = ["\n".join(head), _rows("v", positions)]
@@ -57,7 +57,7 @@ def write_obj(asset: Asset, path: Path | str) -> None:
         blocks.append("usemtl drawing")
         texture = path.with_name(f"{path.stem}_texture.png")
         texture.write_bytes(mesh.texture.png)
-        # illum 0 is constant colour: a drawing brings its own light.
+        # illum 0 is constant colour: shading is part of the drawing.
         lines = ["newmtl drawing", "Ka 0 0 0", "Kd 1 1 1", "Ks 0 0 0", "illum 0", f"map_Kd {texture.name}", ""]
         material.write_bytes("\n".join(lines).encode())
     blocks.append("\n".join(template % tuple(row) for row in corners.reshape(len(corners), -1).tolist()))

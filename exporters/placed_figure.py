@@ -1,4 +1,4 @@
-"""A figure with a place, as a tileset of many needs it: a light record, its meshes left on the disk."""
+"""Placed figures for tilesets of many: lightweight records whose meshes stay on disk."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from georef.placement import GeoPlacement
 
 Vector = tuple[float, float, float]
 Value = str | int | float | bool | None
-"""Of an attribute; whole numbers are of 64 bits."""
+"""Value of an attribute; integers have at most 64 bits."""
 
 Attributes = tuple[tuple[str, Value], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedFigure:
-    """What a tileset says about a figure; about 1 kB, so that 100,000 of them fit into memory.
+    """Record of a figure in a tileset; about 1 kB, so that 100,000 of them fit into memory.
 
-    name : as people know it; need not be unique
-    placement : where it stands
+    name : display name; need not be unique
+    placement : its place on the earth
     low, high : corners of the box round all levels of detail, TILE frame, metres
-    contents : one file per level of detail, finest first: paths with slashes, seen from the tileset's folder, or
-        wherever they are before they are copied there
+    contents : one file per level of detail, finest first: paths with slashes, relative to the tileset's folder, or
+        their paths before they are copied there
     errors : per level, the largest distance to the finest surface, metres; the first is 0
     source : the picture it was made from, "" if unknown
     copyright : attribution line, may be empty
     parts : names of its body parts
-    shares : per part, the share of its surface that the drawing itself showed; empty if unknown
+    shares : per part, the observed share of its surface; empty if unknown
     observed : the same share for the whole surface; None if unknown
-    attributes : further columns of the table that the figure is a row of, such as artist and year: pairs of name and
-        value, kept as `plain_attributes` of them. Figures of one table have the same columns, in one order
+    attributes : further columns of the figure's row in a table, such as artist and year: pairs of name and value,
+        stored as `plain_attributes`. Figures of one table have the same columns in the same order
     """
 
     name: str
@@ -64,11 +64,11 @@ class PlacedFigure:
 
 
 def plain_attributes(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> Attributes:
-    """Names and values as every index can hold them: text, whole number, number, yes or no, or None.
+    """Convert names and values to types that every index supports: str, int, float, bool or None.
 
-    NumPy's scalars become Python's. Whole numbers beyond 64 bits with a sign become text: SQLite has none, and GDAL
-    opens no GeoJSON with one. A number that is not finite becomes None, as tables write missing numbers as NaN
-    and JSON has neither. Of text goes what UTF-8 (halves of surrogate pairs) or SQLite (NUL) cannot hold.
+    NumPy scalars become Python scalars. Integers beyond signed 64 bits become text: SQLite has none, and GDAL opens no
+    GeoJSON with one. A number that is not finite becomes None, as tables write missing numbers as NaN, which JSON does
+    not have. Characters that UTF-8 (lone surrogates) or SQLite (NUL) cannot represent are replaced or removed.
 
     Raises ValueError for a value of another type.
     """
@@ -93,20 +93,20 @@ def _plain(name: str, value: Any) -> Value:
 
 def _plain_text(text: str) -> str:
     if text.isascii() and "\0" not in text:
-        return str(text)  # a plain one
+        return str(text)  # also converts subclasses
     return text.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
 
 
 def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
-    """The record of an asset in memory.
+    """Return the record of an asset in memory.
 
     asset : with a placement; `deviation_m` of its levels becomes the errors
-    contents : where its levels of detail are or will be, finest first
+    contents : paths of its levels of detail, existing or to be written, finest first
 
     Raises ExportError for an asset without a placement.
     """
     if asset.placement is None:
-        raise ExportError(asset.name, "3D Tiles need a place on the earth", "give --lonlat LON LAT")
+        raise ExportError(asset.name, "the format needs a place on the earth", "give --lonlat LON LAT")
     vertices = np.concatenate([tile_from_asset().apply(mesh.vertices) for mesh in asset.lods])
     mesh = asset.mesh
     shares = observed_shares(mesh) or {}
@@ -143,16 +143,16 @@ def area_mean(values: NDArray[np.float64], corners: NDArray[np.float64]) -> floa
 
 @functools.lru_cache(maxsize=1 << 17)
 def ecef_matrix(placement: GeoPlacement) -> NDArray[np.float64]:
-    """(4, 4) ECEF from TILE, read-only; kept, as box, transform and orientation of 100,000 figures need it each."""
+    """(4, 4) ECEF from TILE, read-only; cached, as box, transform and orientation of each figure need it."""
     return ecef_from_tile(placement).matrix
 
 
 def vector(values: NDArray[np.float64]) -> Vector:
-    """Three numbers of an array as a tuple of Python floats."""
+    """Convert an array of three numbers to a tuple of Python floats."""
     x, y, z = values.tolist()
     return (x, y, z)
 
 
 def monotone_errors(errors: list[float]) -> tuple[float, ...]:
-    """Errors of levels, finest first, none below that of a finer one: what tiles must have to be refined at all."""
+    """Make the errors of levels, finest first, non-decreasing, as tiles need them to be refined."""
     return tuple(np.maximum.accumulate(errors).tolist())

@@ -1,9 +1,9 @@
-"""Stanford PLY, binary little-endian, with vertex colours.
+"""Writer of Stanford PLY, binary little-endian, with vertex colours.
 
 http://paulbourke.net/dataformats/ply/
 
-PLY has no usual place for a texture, so no vertex needs to be split: the unsplit solid is written, closed by its
-indices alone, and each vertex takes the mean colour of its copies along texture seams.
+PLY has no standard way to refer to a texture, so no vertex needs to be split: the unsplit solid is written, closed by
+its indices alone, and each vertex gets the mean colour of its copies along texture seams.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def write_ply(asset: Asset, path: Path | str) -> None:
     header.append(f"element vertex {count}")
     header += [f"property {word} {name}" for name, _, word, _ in fields]
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
-    # Readers expect ASCII up there, and some search for the end of the header in comments too: an altered credit is
-    # better than a file that does not open.
+    # Readers expect ASCII in the header, and some search for its end in comments too: an altered credit is better
+    # than a file that does not open.
     lines = [line.replace("end_header", "end header") for line in header]
     text = "\n".join([*lines, "end_header", ""]).encode("ascii", "backslashreplace")
     Path(path).write_bytes(text + vertices.tobytes() + faces.tobytes())

@@ -1,18 +1,18 @@
-"""What the file for one client holds: the choices of `--profile`, each with its reason.
+"""Profiles of clients: the choices of `--profile`, each with its reason.
 
-Without a profile a file has only what every client takes. A profile's file is a second one, for clients of its kind:
-others may refuse it (`extensionsRequired`) or show less.
+Without a profile a file has only features that every client reads. A file with a profile is an additional one for its
+client: others may reject it (`extensionsRequired`) or show less.
 
 `cesiumjs`: geometry quantised and compressed with EXT_meshopt_compression, the texture as lossless WebP. Both are
 required, since a copy for other clients in the same file would cost more than compression saves.
-`cesiumjs-ktx2`: the same with the texture as KTX 2 (ETC1S), which stays compressed in the memory of the graphics card:
-for maps with many figures. Lossy.
-`blender`: no extension at all. Blender turns unlit materials into a knot of nodes that no lamp reaches, and knows
-no part tables; it reads attributes that begin with an underscore, and extras of nodes as custom properties.
-`qgis`: no extension at all, the texture as PNG. QGIS 3.34 and later show textured tiles as they are, unlit, take
-positions as floats only, no vertex colours and no compression but Draco's (src/3d/qgsgltf3dutils.cpp); its 3D symbols
+`cesiumjs-ktx2`: the same with the texture as KTX 2 (ETC1S), which stays compressed in graphics memory: for
+maps with many figures. Lossy.
+`blender`: no extension at all. Blender converts unlit materials to a group of nodes that ignores lamps, and has no
+part tables; it reads attributes that begin with an underscore, and extras of nodes as custom properties.
+`qgis`: no extension at all, the texture as PNG. QGIS 3.34 and later show textured tiles unlit, and support
+only float positions, no vertex colours and no compression but Draco's (src/3d/qgsgltf3dutils.cpp); its 3D symbols
 are read by Assimp.
-`omniverse`: USD in its binary form; arrays as long as a figure's are slow to read as text.
+`omniverse`: USD in its binary form; long arrays are slow to read as text.
 
 https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/EXT_meshopt_compression
 https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_texture_basisu
@@ -31,7 +31,7 @@ from exporters.gltf.ktx2 import encoder
 from exporters.gltf.meshopt import codec
 
 TILES = "3D Tiles"
-"""Stands for tilesets among the suffixes that a client reads."""
+"""Represents tilesets among the suffixes that a client reads."""
 
 TextureKind = Literal["png", "webp", "ktx2"]
 
@@ -40,13 +40,13 @@ TextureKind = Literal["png", "webp", "ktx2"]
 class Profile:
     """Choices for the files of one client.
 
-    name : as on the command line, empty for the file that every client takes
+    name : as on the command line, empty for the general profile
     client : its name for people
     reads : suffixes of the files that it reads, `TILES` for tilesets; all if empty
-    extensions : whether glTF files may have extensions that add something: unlit material, part table, solid, XMP
-    vertex_colors : whether it shows COLOR_0; otherwise an untextured figure has their mean
+    extensions : whether glTF files may have optional extensions: unlit material, part table, solid, XMP
+    vertex_colors : whether it shows COLOR_0; if not, an untextured figure has the mean colour
     compressed : whether glTF geometry is quantised and compressed with meshopt
-    texture : how glTF files hold the texture
+    texture : format of the texture in glTF files
     """
 
     name: str = ""
@@ -68,11 +68,13 @@ class Profile:
         """Raise ExportError for an output that the client does not read; suffix : in lower case, or `TILES`."""
         if self.reads and suffix not in self.reads:
             known = ", ".join(self.reads)
-            raise ExportError(path, f"{self.client} is to read {known} (--profile {self.name})", "name such an output")
+            raise ExportError(
+                path, f"--profile {self.name} cannot be combined with {suffix}", f"{self.client} reads {known}"
+            )
 
     @property
     def texture_ending(self) -> str:
-        """Ending of the texture beside a .gltf file."""
+        """Ending of the name of the texture of a .gltf file."""
         return f"_texture.{self.texture}"
 
 
@@ -97,14 +99,14 @@ PROFILES = {
 
 
 def profile_named(name: str | None) -> Profile:
-    """The profile of that name, `GENERAL` for None. Raises ExportError for a name that there is not."""
+    """Return the profile of a name, `GENERAL` for None. Raises ExportError for an unknown name."""
     if name is None:
         return GENERAL
     if name not in PROFILES:
-        raise ExportError("--profile", f"there is no profile {name}", f"choose from {', '.join(PROFILES)}")
+        raise ExportError("--profile", f"unknown profile {name!r}", f"choose from {', '.join(PROFILES)}")
     return PROFILES[name]
 
 
 def suffix_of(path: Path) -> str:
-    """What `Profile.check` calls the suffix of a main file."""
+    """Suffix of a main file as used by `Profile.check`."""
     return TILES if path.name == "tileset.json" else path.suffix.lower()

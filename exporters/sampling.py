@@ -1,4 +1,4 @@
-"""Reading textures at texture coordinates."""
+"""Sampling of textures at texture coordinates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from exporters.asset import ByteArray, Texture, TexturedMesh
 
 
 def sample(texture: Texture, uv: NDArray[np.floating]) -> ByteArray:
-    """Bilinear samples of a texture.
+    """Sample a texture with bilinear interpolation.
 
     texture : (H, W, C); uv : (N, 2) float, v = 0 at image row 0, clamped to [0, 1]
     returns : (N, C) uint8
@@ -43,18 +43,18 @@ def vertex_colors(mesh: TexturedMesh) -> ByteArray | None:
 
 
 def face_parts(mesh: TexturedMesh) -> ByteArray:
-    """Part label (F,) uint8 of each triangle: the one at least two corners carry, else the first corner's."""
+    """Part label (F,) uint8 of each triangle: that of at least two corners, else of the first corner."""
     assert mesh.parts is not None
     first, second, third = mesh.parts[mesh.faces].T
     return np.asarray(np.where(second == third, second, first), dtype=np.uint8)
 
 
 _SPLIT = 4
-"""Triangles are sampled at the centres of 16 equal pieces: 1 % of noise per part, 20 k triangles in 50 ms."""
+"""Triangles are sampled at the centres of 16 equal pieces: 1 % noise per part, 20 k triangles in 50 ms."""
 
 
 def observed_shares(mesh: TexturedMesh) -> dict[int, float] | None:
-    """Share of each part's surface that the drawing itself showed, label → [0, 1]; None without that knowledge."""
+    """Observed share of each part's surface, label → [0, 1]; None if unknown."""
     if mesh.parts is None or mesh.observed is None or mesh.uv is None:
         return None
     centres = []
@@ -67,20 +67,20 @@ def observed_shares(mesh: TexturedMesh) -> dict[int, float] | None:
     weights = np.stack([1 - second - third, second, third], axis=1)
     corners = mesh.uv[mesh.faces].astype(np.float64)
     points = np.einsum("kc,fcx->fkx", weights, corners)
-    seen = sample(mesh.observed, points.reshape(-1, 2))[:, 0].reshape(len(corners), -1).mean(axis=1) / 255.0
-    # By area in space: what is drawn has more texels than the rest.
+    observed = sample(mesh.observed, points.reshape(-1, 2))[:, 0].reshape(len(corners), -1).mean(axis=1) / 255.0
+    # Weighted by area in space: observed surface has more texels than the rest.
     placed = mesh.vertices[mesh.faces].astype(np.float64)
     area = np.linalg.norm(np.cross(placed[:, 1] - placed[:, 0], placed[:, 2] - placed[:, 0]), axis=1)
     parts = face_parts(mesh)
     total = np.bincount(parts, weights=area, minlength=256)
-    visible = np.bincount(parts, weights=area * seen, minlength=256)
-    # Vertex labels can occur that no triangle has in majority: nothing of such a part was seen.
+    visible = np.bincount(parts, weights=area * observed, minlength=256)
+    # A vertex label may not be the majority of any triangle: nothing of such a part is observed.
     return {
         int(label): float(visible[label] / total[label]) if total[label] else 0.0 for label in np.unique(mesh.parts)
     }
 
 
 def observed_share(mesh: TexturedMesh) -> float | None:
-    """Share of the whole surface that the drawing itself showed, in [0, 1]; None without that knowledge."""
+    """Observed share of the whole surface, in [0, 1]; None if unknown."""
     shares = observed_shares(replace(mesh, parts=np.zeros(len(mesh.vertices), np.uint8)))
     return None if shares is None else shares.get(0, 0.0)

@@ -1,10 +1,9 @@
-"""The closed surface behind a mesh whose vertices are split along texture seams, and whether it is one.
+"""Solid surface of a mesh whose vertices are split along texture seams, and its topology.
 
-`measure_topology` is the only check of closedness, orientation, manifoldness, pieces, handles and volume; the repair
-of meshes has its own labels of edges and fans (`fig2mesh.mesh.topology`), and trimesh is the judge of tests and
-evaluations. All it finds is combinatorial except the volumes: coordinates never decide whether an edge is shared.
-Plain NumPy and SciPy's graphs, 0.1 s for 70,000 triangles, so that writers and validators can afford to measure every
-file.
+`measure_topology` is the only check of closedness, orientation, manifoldness, components, genus and volume; mesh
+repair has its own labels of edges and fans (`fig2mesh.mesh.topology`), and tests and evaluations use trimesh. All
+measures except the volumes are combinatorial: coordinates never decide whether an edge is shared.
+Plain NumPy and SciPy's graphs, 0.1 s for 70,000 triangles, so that writers and validators can measure every file.
 """
 
 from __future__ import annotations
@@ -19,10 +18,10 @@ from exporters.asset import FloatArray, IntArray, TexturedMesh
 
 
 @dataclass(frozen=True)
-class Solid:
-    """The unsplit surface of a mesh.
+class WeldedMesh:
+    """A mesh with the vertices joined that texture seams have split.
 
-    first : (S,) int64, for each solid vertex the first mesh vertex that came from it
+    first : (S,) int64, for each solid vertex its first mesh vertex
     faces : (F, 3) int32 into the S solid vertices
     vertex : (V,) int64, for each mesh vertex its solid vertex
     """
@@ -32,37 +31,37 @@ class Solid:
     vertex: NDArray[np.int64]
 
 
-def solid_of(mesh: TexturedMesh) -> Solid:
-    """The solid that `mesh.solid_index` describes, its vertices numbered without gaps."""
+def solid_of(mesh: TexturedMesh) -> WeldedMesh:
+    """Return the solid described by `mesh.solid_index`, its vertices numbered consecutively."""
     _, first, vertex = np.unique(mesh.solid_index, return_index=True, return_inverse=True)
-    return Solid(first, vertex[mesh.faces].astype(np.int32), vertex)
+    return WeldedMesh(first, vertex[mesh.faces].astype(np.int32), vertex)
 
 
 def merged_by_position(vertices: NDArray[Any], faces: NDArray[Any]) -> tuple[NDArray[Any], IntArray]:
-    """Vertices (S, 3) and faces (F, 3) int32 after merging vertices at bitwise equal positions.
+    """Merge vertices at equal positions; returns vertices (S, 3) and faces (F, 3) int32.
 
-    vertices : (V, 3) float; faces : (F, 3) integer. For files that do not say which vertices belong together.
+    vertices : (V, 3) float; faces : (F, 3) integer. For files that do not record which vertices belong together.
     """
-    # Adding zero turns -0.0 into 0.0, which is the same place in other bits.
+    # Adding zero turns -0.0 into 0.0, which is an equal number with other bits.
     unique, inverse = np.unique(vertices + vertices.dtype.type(0), axis=0, return_inverse=True)
     return unique, inverse.reshape(-1)[faces].astype(np.int32)
 
 
 @dataclass(frozen=True)
 class Topology:
-    """What the edges of a triangle mesh say; all counts of zero faults mean a closed, oriented, manifold surface.
+    """Topology of a triangle mesh; if all counts of faults are zero, it is a closed, oriented, manifold surface.
 
     vertices, triangles : counts; vertices that no triangle uses do not count
     boundary_edges : edges with one triangle
     nonmanifold_edges : edges with three triangles or more
     misoriented_edges : edges whose two triangles run along them in the same direction
-    nonmanifold_vertices : further fans of triangles that meet an earlier fan in nothing but one vertex
-    degenerate_faces : triangles that name a vertex twice
-    components : pieces connected over edges of two triangles
+    nonmanifold_vertices : additional fans of triangles that share only a vertex with another fan
+    degenerate_faces : triangles that use a vertex twice
+    components : components connected over edges of two triangles
     euler : vertices - edges + triangles
-    genus : number of handles, all pieces together; None unless the surface is closed, oriented and manifold
+    genus : number of handles of all components; None unless the surface is closed, oriented and manifold
     volume : enclosed volume in cubic units of the vertices, positive if faces are counter-clockwise from outside
-    least_volume : that of the piece with the smallest one; negative for cavities and pieces turned inside out
+    min_volume : smallest volume of a component; negative for cavities and inverted components
     """
 
     vertices: int
@@ -76,36 +75,36 @@ class Topology:
     euler: int
     genus: int | None
     volume: float
-    least_volume: float
+    min_volume: float
 
     @property
     def closed(self) -> bool:
-        """No edge is open or shared by more than two triangles."""
+        """Whether every edge has exactly two triangles."""
         return self.triangles > 0 and not (self.boundary_edges or self.nonmanifold_edges or self.degenerate_faces)
 
     @property
     def oriented(self) -> bool:
-        """Neighbours agree on which side is out."""
+        """Whether neighbouring triangles are oriented consistently."""
         return not self.misoriented_edges
 
     @property
     def manifold(self) -> bool:
-        """No edge with a third triangle and no vertex where two fans meet."""
+        """Whether no edge has a third triangle and no vertex joins two fans."""
         return not (self.nonmanifold_edges or self.nonmanifold_vertices or self.degenerate_faces)
 
     @property
     def solid(self) -> bool:
-        """Closed, consistently oriented and manifold."""
+        """Whether it is closed, consistently oriented and manifold."""
         return self.closed and self.oriented and self.manifold
 
     @property
     def outward(self) -> bool:
-        """A solid whose every piece has its inside inside: none is a cavity or turned inside out."""
-        return self.solid and self.least_volume > 0
+        """Whether it is a solid without cavities or inverted components."""
+        return self.solid and self.min_volume > 0
 
 
 def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
-    """Count the faults, pieces and handles of a triangle mesh.
+    """Measure the topology of a triangle mesh.
 
     vertices : (V, 3) float, any frame; faces : (F, 3) integer
     """
@@ -131,8 +130,8 @@ def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
         return int(number), labels
 
     components, piece = pieces(count, one // 3, two // 3)
-    # Half-edge h leaves corner h and reaches the next corner of its triangle. Joining corners that are the same
-    # vertex of neighbours leaves one group of corners per fan; a clean vertex has exactly one fan.
+    # Half-edge h leaves corner h and reaches the next corner of its triangle. Joining corners of neighbours at the same
+    # vertex leaves one group of corners per fan; a manifold vertex has exactly one fan.
     following = np.roll(np.arange(3 * count).reshape(-1, 3), -1, axis=1).reshape(-1)
     left = np.concatenate([one, following[one]])
     right = np.concatenate([np.where(same_way, two, following[two]), np.where(same_way, following[two], two)])
@@ -157,16 +156,16 @@ def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
         euler=euler,
         genus=components - euler // 2 if clean else None,
         volume=volume,
-        least_volume=float(piece_volumes(triangles, piece).min()),
+        min_volume=float(piece_volumes(triangles, piece).min()),
     )
 
 
 def piece_volumes(triangles: NDArray[np.float64], piece: NDArray[np.int32]) -> NDArray[np.float64]:
-    """(P,) signed volume of each piece, cubic units of the vertices.
+    """(P,) signed volume of each component, cubic units of the vertices.
 
-    triangles : (F, 3, 3) corners; piece : (F,) number of the piece that each belongs to
+    triangles : (F, 3, 3) corners; piece : (F,) index of the component of each
     """
-    # Measured from the piece's own middle: far from the origin the determinants would cancel badly.
+    # Relative to the component's centroid: far from the origin the determinants would suffer from cancellation.
     count = np.bincount(piece)
     middle = np.stack([np.bincount(piece, triangles[:, 0, axis]) for axis in range(3)], axis=1) / count[:, None]
     near = triangles - middle[piece][:, None]
@@ -175,9 +174,9 @@ def piece_volumes(triangles: NDArray[np.float64], piece: NDArray[np.int32]) -> N
 
 
 def unit_normals(normals: FloatArray) -> FloatArray:
-    """Normals (V, 3) float32 of length 1 to rounding: file formats demand it to tighter limits than shading does."""
+    """Normalise normals (V, 3) float32 to rounding: file formats have tighter tolerances than shading."""
     wide = normals.astype(np.float64)
     length = np.linalg.norm(wide, axis=1, keepdims=True)
-    # A vertex of slivers only can have no direction at all; up is as good as any and keeps the file valid.
+    # A vertex with only slivers may have no normal at all; an arbitrary direction, up, keeps the file valid.
     wide = np.where(length > 1e-12, wide / np.maximum(length, 1e-12), (0.0, 1.0, 0.0))
     return np.asarray(wide, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Checking files that were written: the rules of their formats and our own promises about figures."""
+"""Validation of files: the rules of their formats and the guarantees of fig2mesh about figures."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from exporters.gis.check import check_czml, check_geojson
 from exporters.gltf.check import check_gltf
 from exporters.tiles.check import check_tileset
 from exporters.triangles.check import check_triangles
-from exporters.usd.process import check_usd_apart
+from exporters.usd.process import check_usd_isolated
 from georef.errors import PlacementError
 from georef.untrusted.damage import DamagedFile
 
 __all__ = ["Finding", "validate"]
 
 CHECKS = {
-    ".usda": check_usd_apart,
-    ".usdc": check_usd_apart,
-    ".usdz": check_usd_apart,
+    ".usda": check_usd_isolated,
+    ".usdc": check_usd_isolated,
+    ".usdz": check_usd_isolated,
     ".ply": check_triangles,
     ".obj": check_triangles,
     ".czml": check_czml,
@@ -30,16 +30,16 @@ CHECKS_WITH_KHRONOS = {".glb": check_gltf, ".gltf": check_gltf, ".json": check_t
 
 
 def validate(path: str | os.PathLike[str], external: bool = True) -> list[Finding]:
-    """Findings about a file or tileset, worst first; an empty list or nothing but infos is a clean bill.
+    """Return findings about a file or tileset, most severe first; no findings or only infos mean a valid file.
 
     path : .glb, .gltf, .usda, .usdc, .usdz, .ply, .obj, .czml, .geojson, a tileset.json or its folder
-    external : for glTF run the Khronos validator too, if Node and the npm package gltf-validator are there
+    external : for glTF run the Khronos validator too, if Node and the npm package gltf-validator are installed
 
-    Raises ExportError for a path that is not there or of another kind.
+    Raises ExportError for a missing or unsupported file.
     """
     path = Path(path)
     if not path.exists():
-        raise ExportError(path, "is not there", "check the name")
+        raise ExportError(path, "no such file or folder", "check the path")
     try:
         findings = _check_any(path, external)
     except (DamagedFile, PlacementError) as error:
@@ -53,4 +53,5 @@ def _check_any(path: Path, external: bool) -> list[Finding]:
         return CHECKS_WITH_KHRONOS[suffix](path, external)
     if suffix in CHECKS:
         return CHECKS[suffix](path)
-    raise ExportError(path, f"no check for suffix {suffix or 'none'}", "see exporters.write.FORMATS")
+    known = [*CHECKS_WITH_KHRONOS, *CHECKS]
+    raise ExportError(path, f"cannot check files with suffix {suffix or 'none'}", f"give one of {', '.join(known)}")

@@ -1,4 +1,4 @@
-"""Path to writer. The files of an output appear whole or not at all, the one that names the others last."""
+"""Writers by path. The files of an output are written atomically, the one that names the others last."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ OutputPath = str | os.PathLike[str]
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of output.
+    """An output format.
 
-    title : for people
+    title : display name
     writer : writes an asset to a path for the client of a profile
-    beside : endings, after the stem, of the files written next to the one asked for; the textures of USD, one for
-        each level of detail, are not among them
-    placed : whether it says nothing without a place on the earth
+    companions : endings, after the stem, of further files written next to it; without the textures of USD, one for
+        each level of detail
+    placed : whether it needs a place on the earth
     """
 
     title: str
     writer: Callable[[Asset, Path, Profile], None]
-    beside: tuple[str, ...] = ()
+    companions: tuple[str, ...] = ()
     placed: bool = False
 
 
 TEXTURE = "_texture.png"
-"""Ending of textures beside a model; not `.png` alone, as `figure.png` is usually the drawing itself."""
+"""Ending of the texture of a model; not `.png` alone, as `figure.png` is usually the drawing itself."""
 
 
 def _same_for_all(writer: Callable[[Asset, Path], None]) -> Callable[[Asset, Path, Profile], None]:
@@ -62,7 +62,7 @@ FORMATS: dict[str, Format] = {
 
 
 def is_tileset(path: OutputPath) -> bool:
-    """Whether a path asks for 3D Tiles: no suffix, a slash at its end, an existing folder, or named tileset.json."""
+    """Whether a path means 3D Tiles: no suffix, a trailing slash, an existing folder, or the name tileset.json."""
     text, file = os.fspath(path), Path(path)
     if text.endswith(("/", os.sep)) or file.name == "tileset.json" or not file.suffix:
         return True
@@ -70,7 +70,7 @@ def is_tileset(path: OutputPath) -> bool:
 
 
 def has_levels(path: OutputPath) -> bool:
-    """Whether an output holds all levels of detail of an asset, not the finest alone: 3D Tiles and USD."""
+    """Whether an output contains all levels of detail of an asset, not only the finest: 3D Tiles and USD."""
     return is_tileset(path) or Path(path).suffix.lower().startswith(".usd")
 
 
@@ -80,7 +80,7 @@ def needs_place(path: OutputPath) -> bool:
 
 
 def in_order(paths: Iterable[OutputPath]) -> list[OutputPath]:
-    """The outputs of one asset in the order to write them: models before the files that have them beside."""
+    """Sort the outputs of one asset for writing: models before the files that include them as companions."""
     return sorted(paths, key=lambda path: FORMATS.get(Path(path).suffix.lower(), FORMATS[".glb"]).placed)
 
 
@@ -92,17 +92,17 @@ def check_outputs(
     tiles_version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
 ) -> None:
-    """Find out before the work begins what would keep outputs from being written.
+    """Check before the work begins that outputs can be written.
 
     paths : all outputs of one asset
     overwrite : existing files may be replaced
-    name, lods, tiles_version : of the asset to come, from which the files beside a tileset.json get their names
-    profile : of the client that is to read them
+    name, lods, tiles_version : of the asset, which determine the content files of a tileset.json
+    profile : of the client that reads them
 
     Raises ExportError naming the first output with an unknown suffix, that the client does not read, in a folder that
-    cannot be written to, that exists although `overwrite` is off, or that is asked for twice.
+    cannot be written to, that exists although `overwrite` is off, or that is given twice.
     """
-    seen: set[str] = set()
+    known: set[str] = set()
     parts: dict[str, Path] = {}
     for path in paths:
         main = _main_file(path)
@@ -110,16 +110,18 @@ def check_outputs(
         check_file(path, main, overwrite)
         for companion in _companions(path, name, lods, tiles_version, profile):
             if companion.exists() and not overwrite:
-                raise ExportError(companion, f"exists already and belongs to {main.name}", "use --overwrite")
+                raise ExportError(
+                    companion, f"already exists, a part of {main.name}", "use --overwrite or choose another name"
+                )
             parts[os.path.abspath(companion)] = main
         key = os.path.abspath(main)
-        if key in seen:
-            raise ExportError(os.fspath(path), "is asked for twice", "name each output once")
-        seen.add(key)
-    for key in seen & set(parts):
+        if key in known:
+            raise ExportError(os.fspath(path), "given twice", "give each output once")
+        known.add(key)
+    for key in known & set(parts):
         if parts[key].suffix.lower() in (".czml", ".geojson"):
-            continue  # the model beside them is the one that is asked for
-        raise ExportError(key, f"is also a part of {parts[key]}", "choose another name or folder for one of them")
+            continue  # their model is the requested one
+        raise ExportError(key, f"also a part of {parts[key]}", "choose another name or folder for one of them")
 
 
 def write(
@@ -130,17 +132,17 @@ def write(
     tiles_version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
 ) -> tuple[Path, ...]:
-    """Write an asset in the format that the path names, whole or not at all.
+    """Write an asset atomically in the format given by the path.
 
     asset : not changed
     path : a file with a suffix of `FORMATS`; a folder or its tileset.json for 3D Tiles. Missing folders are made
-    overwrite : replace what is there; in the folder of a tileset only files of the names we write
+    overwrite : replace existing files; in the folder of a tileset only files of the same names
     visible_from_m, tiles_version : for 3D Tiles, see `exporters.tiles.tileset.write_tileset`
-    profile : what the client of the file takes
+    profile : of the client of the file
     returns : the files written, the one that names the others last
 
-    Raises ExportError as `check_outputs` does, where the profile needs what is not installed, and where the disk
-    refuses.
+    Raises ExportError as `check_outputs` does, where the profile needs a package that is not installed, and where the
+    file cannot be written.
     """
     main = _main_file(path)
     profile.check(os.fspath(path), suffix_of(main))
@@ -162,7 +164,7 @@ def _main_file(path: OutputPath) -> Path:
     file = Path(path)
     if file.suffix.lower() not in FORMATS:
         known = ", ".join(FORMATS)
-        raise ExportError(os.fspath(path), f"unknown suffix {file.suffix}", f"use {known} or a folder for 3D Tiles")
+        raise ExportError(os.fspath(path), f"unknown suffix {file.suffix!r}", f"use {known} or a folder for 3D Tiles")
     return file
 
 
@@ -172,24 +174,24 @@ def _companions(path: OutputPath, name: str, lods: int, version: TilesVersion, p
     file = Path(path)
     if file.suffix.lower() in (".usda", ".usdc"):
         return [file.with_name(texture_name(file.stem, lod)) for lod in range(lods)]
-    endings = FORMATS[file.suffix.lower()].beside
+    endings = FORMATS[file.suffix.lower()].companions
     if file.suffix.lower() == ".gltf":
         endings = tuple(profile.texture_ending if ending == TEXTURE else ending for ending in endings)
     return [file.with_name(file.stem + ending) for ending in endings]
 
 
 def check_file(path: OutputPath, main: Path, overwrite: bool) -> None:
-    """Find out what would keep `main` from being written.
+    """Check that `main` can be written.
 
-    path : the output as it was asked for, for messages. Raises ExportError.
+    path : the output as given by the user, for messages. Raises ExportError if it cannot.
     """
     name = os.fspath(path)
     if main.is_dir():
-        raise ExportError(name, "is a folder", "remove it or choose another name")
+        raise ExportError(name, "a directory, not a file", "remove it or choose another name")
     if main.exists() and not overwrite:
-        raise ExportError(main, "exists already", "use --overwrite or choose another name")
+        raise ExportError(main, "already exists", "use --overwrite or choose another name")
     ancestor = next(folder for folder in Path(os.path.abspath(main)).parents if os.path.lexists(folder))
     if not ancestor.is_dir():
-        raise ExportError(name, f"{ancestor} is not a folder", "choose another folder")
+        raise ExportError(name, f"{ancestor} is not a directory", "choose another folder")
     if not os.access(ancestor, os.W_OK | os.X_OK):
-        raise ExportError(name, f"no permission to write into {ancestor}", "choose another folder")
+        raise ExportError(name, f"no permission to write to {ancestor}", "choose another folder")

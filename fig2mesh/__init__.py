@@ -6,7 +6,7 @@
     model = fig2mesh.convert(request)
     fig2mesh.write(model, "farmer.glb")
 
-Everything below is imported when it is first used.
+Everything below is imported on first use.
 """
 
 from __future__ import annotations

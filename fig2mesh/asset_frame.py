@@ -1,4 +1,4 @@
-"""From FIGURE to ASSET: metres, feet on the ground, origin between them."""
+"""Transform from FIGURE to ASSET: metres, feet on the ground, origin between them."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from georef.frames import ASSET, FIGURE
 from georef.transform import Transform
 
 STANDING_FOOT_SHARE = 0.12
-"""A foot this share of the figure's height above the other one does not stand."""
+"""Threshold, share of the figure's height: a foot this far above the other one does not stand."""
 
 
 def asset_from_figure(pose: Pose3D, vertices: FloatArray, height_m: float) -> Transform:
-    """The transform that puts the lowest vertex on the ground and the standing feet around the origin.
+    """Transform that puts the lowest vertex on the ground and the standing feet around the origin.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def asset_from_figure(pose: Pose3D, vertices: FloatArray, height_m: float) -> Tr
 
 
 def _stand(joints: FloatArray) -> NDArray[np.float64]:
-    """(D,) the middle of the standing feet of (21, D) FIGURE joints."""
+    """(D,) mean position of the standing feet of (21, D) FIGURE joints."""
     feet = [[joints[JOINT[f"{side}_{joint}"]] for joint in ("ankle", "foot")] for side in "lr"]
     middles = np.array(feet, np.float64).mean(axis=1)
     standing = middles[:, 1] <= middles[:, 1].min() + STANDING_FOOT_SHARE * FIGURE_HEIGHT
@@ -40,10 +40,10 @@ def _stand(joints: FloatArray) -> NDArray[np.float64]:
 
 
 def foot_on_picture(figure: Figure) -> tuple[float, float]:
-    """The pixel (x, y) between the standing feet, at the lowest row of the drawing, of the picture that the figure was
-    cut from.
+    """Pixel (x, y) between the standing feet, at the lowest row of the drawing, in the picture that the figure was cut
+    from.
 
-    It is the one under the ASSET origin, as far as that is known before there is a surface: the mesh, of finite
+    It is the pixel under the ASSET origin, as far as that is known before there is a surface: the mesh, of finite
     triangles, may end a fraction of a pixel higher.
     """
     frame = image_frame(figure)
@@ -54,12 +54,12 @@ def foot_on_picture(figure: Figure) -> tuple[float, float]:
 
 
 def height_on_picture(figure: Figure) -> float:
-    """What is a figure's height on the globe, in pixels of the picture that it was cut from."""
+    """Height of a figure on the globe, in pixels of the picture that it was cut from."""
     return figure.step_px * FIGURE_HEIGHT / image_frame(figure).units_per_px
 
 
 def on_drawing(frame: ImageFrame, asset: Transform) -> tuple[float, tuple[float, float]]:
-    """ASSET metres a pixel of the drawing, and the pixel (x, y) under the ASSET origin.
+    """ASSET metres per pixel of the drawing, and the pixel (x, y) under the ASSET origin.
 
     asset : ASSET from FIGURE
     """

@@ -1,4 +1,4 @@
-"""How much work was done: calls of networks, values of fields, rays. A report can prove by it what was not done."""
+"""Counters of work: network calls, field values, rays. With them a report can prove what was not computed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _counts: ContextVar[dict[Work, int] | None] = ContextVar("counts", default=None)
 
 @contextmanager
 def counting() -> Iterator[dict[Work, int]]:
-    """Work done inside the block, by kind; none is 0. Blocks within blocks count for the inner one alone."""
+    """Count the work done inside the block, by kind, from 0. Work in a nested block counts for the inner block only."""
     counts = dict.fromkeys(WORK, 0)
     token = _counts.set(counts)
     try:
@@ -41,7 +41,7 @@ def counting() -> Iterator[dict[Work, int]]:
 
 
 def count(work: Work, number: int = 1) -> None:
-    """Note some work, if anybody counts."""
+    """Add to the counters, inside a `counting` block."""
     counts = _counts.get()
     if counts is not None:
         counts[work] += number

@@ -1,4 +1,4 @@
-"""From pixels of the drawing to FIGURE units and back."""
+"""Mapping between pixels of the drawing and FIGURE units."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from fig2mesh.records import Figure
 from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT
 
-WIDEST = 3.0
-"""Drawings wider than this many heights are scaled by their width instead: nobody is 30 m long for lying down."""
+MAX_ASPECT = 3.0
+"""Largest ratio of width to height; wider drawings are scaled by width, or a figure lying down would be 30 m long."""
 
 
 @dataclass(frozen=True)
 class ImageFrame:
-    """The map between IMAGE and FIGURE (x right, y up, pelvis at the origin, drawn height 1.79 units).
+    """Mapping between IMAGE and FIGURE (x right, y up, pelvis at the origin, drawn height 1.79 units).
 
     origin_px : (x, y) of the FIGURE origin in IMAGE pixels
-    units_per_px : FIGURE units a pixel
+    units_per_px : FIGURE units per pixel
     """
 
     origin_px: tuple[float, float]
@@ -37,8 +37,8 @@ class ImageFrame:
 
 
 def image_frame(figure: Figure) -> ImageFrame:
-    """The frame of a figure: its silhouette is 1.79 units high, its pelvis the origin (paper §4.1)."""
+    """Frame of a figure: its silhouette is 1.79 units high, its pelvis the origin (paper §4.1)."""
     rows, columns = np.flatnonzero(figure.mask.any(axis=1)), np.flatnonzero(figure.mask.any(axis=0))
-    drawn_height_px = max(rows[-1] - rows[0] + 1, (columns[-1] - columns[0] + 1) / WIDEST)
+    drawn_height_px = max(rows[-1] - rows[0] + 1, (columns[-1] - columns[0] + 1) / MAX_ASPECT)
     x, y = figure.joints_px[JOINT["pelvis"]].tolist()
     return ImageFrame((x, y), FIGURE_HEIGHT / float(drawn_height_px))

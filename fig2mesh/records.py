@@ -1,6 +1,6 @@
-"""What the stages hand to each other: frozen records with read-only arrays.
+"""Records passed between stages: frozen, with read-only arrays.
 
-Every array says its frame; the frames are defined in `georef.frames`.
+The frame of every array is stated; the frames are defined in `georef.frames`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ByteArray = NDArray[np.uint8]
 BoolArray = NDArray[np.bool_]
 
 DepthOrder = Literal["front", "behind"]
-"""Before the rest of the body as the viewer sees it, or behind it."""
+"""In front of the rest of the body from the viewer's side, or behind it."""
 
 
 class _Checked:
@@ -41,10 +41,10 @@ class Figure(_Checked):
     joints_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
     visible : (21,) bool; False where a joint is hidden and its position a guess
     part_labels : (H, W) uint8, IMAGE, `PART_NAMES`; all 0 where the user gave none
-    depth_order : limbs (of `LIMBS`) of which the user says that they are before or behind the body; of the others the
-        pose tells
+    depth_order : limbs (of `LIMBS`) that the user placed in front of or behind the body; the others follow from the
+        pose
     origin_px : (x, y) of its upper left corner in the picture that it was cut from, px of that picture
-    step_px : pixels of that picture to one of its own
+    step_px : pixels of that picture per pixel of its own
     """
 
     name: str
@@ -110,7 +110,7 @@ class PartSdf(_Checked):
     def __post_init__(self) -> None:
         self._put("grid", np.float32, (None, None, None))
         if len(set(self.grid.shape)) != 1 or self.grid.shape[0] < 2:
-            raise ValueError(f"grid: shape is {self.grid.shape}, expected a cube of at least 2 nodes an edge")
+            raise ValueError(f"grid: shape is {self.grid.shape}, expected a cube of at least 2 nodes per edge")
         self._put("centre", np.float32, (3,))
         if not self.edge > 0:
             raise ValueError(f"edge: {self.edge}, expected a positive length")
@@ -140,7 +140,7 @@ class Rays(_Checked):
 
 @dataclass(frozen=True)
 class Hits(_Checked):
-    """Where rays meet the surface.
+    """Intersections of rays with the surface.
 
     depth : (N,) float32, distance along the ray, FIGURE units; infinite where nothing is hit
     part_index : (N,) int32, index into `Body.parts` of the part hit; -1 where nothing is hit
@@ -187,7 +187,7 @@ class Mesh(_Checked):
     """A triangle mesh.
 
     vertices : (V, 3) float32, FIGURE
-    faces : (F, 3) int32, counter-clockwise seen from outside
+    faces : (F, 3) int32, counter-clockwise as viewed from outside
     """
 
     vertices: FloatArray
@@ -202,9 +202,9 @@ class Mesh(_Checked):
 
 @dataclass(frozen=True)
 class Surface(_Checked):
-    """What is known of a mesh besides its shape.
+    """Attributes of a mesh besides its shape.
 
-    normals : (V, 3) float32 of its vertices, FIGURE; None where nobody asks for them
+    normals : (V, 3) float32 of its vertices, FIGURE; None where they are not requested
     parts : (V,) uint8 label of the part nearest to each vertex
     deviation : mean and largest distance to the mesh it was simplified from, FIGURE units
     """

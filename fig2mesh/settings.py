@@ -1,4 +1,4 @@
-"""What a request asks for: the quality presets and everything that changes the result."""
+"""Settings of a conversion: the quality presets and everything that changes the result."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ class Settings:
 
     canvas_px : longest side of the raster on which outlines are inflated
     voxel : spacing of the part grids
-    part_nodes : nodes an edge of the grids on which the networks' fields are decoded
+    part_nodes : nodes per edge of the grids on which the networks' fields are decoded
     precision : of the part networks' arithmetic
     spacing : distance between neighbouring points of the scan
     triangles : of the finest mesh
     texture_size : texels along each side of the square texture
-    lods : number of meshes, the finest included; each has a quarter of the triangles of the one before
-    mesher : how the surface becomes a mesh
-    closing : what closes the holes that ball pivoting leaves
-    parts : what depths come from: networks, or rules and the outline alone
-    textures : of unseen sides: as networks paint them, or plain colours of what is drawn before them; none at all
-    contours : of the silhouette, if drawn: kept on the surface, or left to whoever shows the model
+    lods : number of levels of detail, the finest included; each has a quarter of the triangles of the one before
+    mesher : method that turns the surface into a mesh
+    closing : method that closes the holes left by ball pivoting
+    parts : source of depths: networks, or rules and the outline alone
+    textures : of sides that the drawing does not show: inferred by networks, or plain colours of what is drawn in
+        front of them; none at all
+    contours : of the silhouette, if drawn: kept on the surface, or left to the client
     light : clients light the surface; without, they show its colours as they are
     normals : whether any output or effect needs shading normals, see `fig2mesh.conversion.plan`
     device : "cpu" or "cuda"
@@ -57,12 +58,12 @@ class Settings:
 
     @property
     def picture_px(self) -> int:
-        """About how many pixels the longer side of a drawing is reduced to: no texture shows more."""
+        """Approximate number of pixels to which the longer side of a drawing is reduced: no texture shows more."""
         return 2 * max(self.texture_size, 1024)
 
 
 EFFECTS = ("light", "none")
-"""What the main job can be asked for by name; `fig2mesh render` has more."""
+"""Effects of the main job by name; `fig2mesh render` has more."""
 
 PRESETS: dict[Quality, Settings] = {
     "draft": Settings(canvas_px=256, voxel=0.01, part_nodes=24, spacing=0.012, triangles=6_000, texture_size=512),
@@ -74,8 +75,8 @@ PRESETS: dict[Quality, Settings] = {
 def settings_for(quality: Quality, **changes: object) -> Settings:
     """A preset with the given fields replaced; fields that are None keep the preset's value.
 
-    Who wants parts without networks gets textures without them too, and a figure without colours is lit, lest it be a
-    white silhouette; unless told otherwise.
+    Unless given, `textures` uses no networks where `parts` does not, and a figure without colours is lit, as it would
+    be a white silhouette otherwise.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     if given.get("parts") == "outline":

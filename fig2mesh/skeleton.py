@@ -1,7 +1,7 @@
 """Joints, bones and parts of the figure, each table once; the PART frame (paper §3, §4.2).
 
 Left and right are the figure's own. Tables of pairs give the left side before the right one, as `JOINT_NAMES` and
-`PART_NAMES` do. The commands read names from here: importing this module loads nothing but the standard library.
+`PART_NAMES` do. The commands read names from here, so importing this module loads only the standard library.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FIGURE_HEIGHT: Final = 1.79
-"""Height of every figure, units (and metres unless asked otherwise); paper §4.1, "uniformly to 1.79m"."""
+"""Height of every figure, units (and metres by default); paper §4.1, "uniformly to 1.79m"."""
 
 SIDES: Final = ("l", "r")
 
@@ -94,7 +94,7 @@ PART_KIND: Final = {part: without_side(PART_NAMES[part]) for part in BODY_PARTS}
 """Part label → kind."""
 
 MIRRORED: Final = {part: PART_NAMES[part].startswith("r_") for part in BODY_PARTS}
-"""Part label → whether its network sees it in the mirror: the left side is the one they learn."""
+"""Part label → whether its network gets it mirrored: networks are trained on the left side."""
 
 PART_NEIGHBOURS: Final = frozenset(
     frozenset((PART[first], PART[second]))
@@ -120,7 +120,7 @@ STANDING: Final = {
     "hip": (0.06, 0.52), "knee": (0.065, 0.73), "ankle": (0.07, 0.95), "foot": (0.085, 0.985),
 }
 # fmt: on
-"""Joint without its side → its place in a standing person seen from the front, in heights: (from the midline towards
+"""Joint without its side → its position in a standing person from the front, in heights: (from the midline towards
 the joint's own side, down from the crown)."""
 
 # fmt: off

@@ -11,7 +11,7 @@ log = logging.getLogger("fig2mesh")
 
 
 def configure_logging(quiet: bool, verbose: int) -> None:
-    """Messages to stderr, as many as asked for."""
+    """Log messages to stderr at the requested verbosity."""
     level = logging.ERROR if quiet else logging.DEBUG if verbose else logging.INFO
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(logging.Formatter("%(message)s"))
@@ -22,7 +22,7 @@ def configure_logging(quiet: bool, verbose: int) -> None:
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str], object]]:
-    """A function that names the stage under way; a bar only on a terminal."""
+    """Yield a function that reports the current stage; a progress bar on terminals only."""
     if quiet or not sys.stderr.isatty():
         yield lambda name: None
         return

@@ -1,4 +1,4 @@
-"""Which way a figure looks: text to compass bearing."""
+"""Facing directions as text, parsed to compass bearings."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ COMPASS_POINTS = (
 """The 16 points of the compass, clockwise from north in steps of 22.5 degrees."""
 
 VIEWER_BEARING_DEG = 180.0
-"""A drawn figure looks at the reader, and the reader of a map with north at the top looks at it from the south."""
+"""A drawn figure faces the reader, and the reader of a map with north at the top views it from the south."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 
 
 def normalized_bearing(bearing_deg: float) -> float:
-    """The same direction in [0, 360) degrees, for any finite number of degrees."""
+    """Return the same direction in [0, 360) degrees, for any finite number of degrees."""
     wrapped = math.fmod(bearing_deg, 360.0)
     if wrapped < 0.0:
         wrapped += 360.0
@@ -31,11 +31,11 @@ def normalized_bearing(bearing_deg: float) -> float:
 
 
 def parse_facing(text: str, source: str = "--facing", viewer_deg: float = VIEWER_BEARING_DEG) -> float:
-    """The compass bearing that a facing names.
+    """Compass bearing of a facing.
 
     text : one of `COMPASS_POINTS` in any case, a number of degrees clockwise from north, or "viewer"
-    source : where the text comes from, for the error message
-    viewer_deg : the bearing towards the reader of the map; default: of one with north at the top
+    source : origin of the text, for the error message
+    viewer_deg : the bearing towards the reader of the map; the default is for a map with north at the top
     returns : degrees clockwise from north in [0, 360)
 
     Raises PlacementError for anything else.
@@ -52,6 +52,6 @@ def parse_facing(text: str, source: str = "--facing", viewer_deg: float = VIEWER
         return normalized_bearing(float(word))
     raise PlacementError(
         source,
-        f"{text!r} is no direction",
+        f"{text!r} is not a direction",
         "give a compass point (N, NNE, NE, ...), degrees clockwise from north, or viewer",
     )

@@ -1,26 +1,26 @@
 """Errors whose cause is the user's input.
 
-One small tree for all three packages: whatever derives from `InputError` becomes one line on stderr and exit
-code 2 in the command line; anything else is a fault of ours.
+One small hierarchy for all three packages: whatever derives from `InputError` becomes one line on stderr and exit
+code 2 in the command line; anything else is an internal error.
 """
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-MOST_CHARACTERS = 600
-"""Of each part of a message: a path may be long, a text out of a file has no business to be."""
+MAX_CHARACTERS = 600
+"""Limit for each part of a message: a path may be long, a text from a file should not be."""
 
 
 def one_line(text: str) -> str:
-    """A text as one line that a terminal only shows: what it would act on, or cannot encode, becomes a mark.
+    """Return a text as one line of printable characters; control characters and what cannot be encoded become U+FFFD.
 
-    Spaces and line breaks become one space each; longer texts than `MOST_CHARACTERS` lose their middle.
+    Runs of whitespace become one space; texts longer than `MAX_CHARACTERS` lose their middle.
     """
     if not text.isprintable():
         text = "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split()))
-    half = MOST_CHARACTERS // 2
-    return text if len(text) <= MOST_CHARACTERS else f"{text[:half]}…{text[-half:]}"
+    half = MAX_CHARACTERS // 2
+    return text if len(text) <= MAX_CHARACTERS else f"{text[:half]}…{text[-half:]}"
 
 
 class InputError(Exception):
@@ -28,16 +28,16 @@ class InputError(Exception):
 
     Parameters
     ----------
-    source : which input (a file name or an option)
-    finding : what was found in it
-    remedy : what to do about it
+    source : name of the input (a file name or an option)
+    finding : the problem
+    remedy : the way to solve it
 
-    `lasting`: the same input fails again until it is changed, so that a batch need not try again.
+    `permanent`: the same input fails again until it is changed, so a batch need not retry it.
 
-    Texts out of files become part of it, so it is made one line of printable characters, see `one_line`.
+    Texts from files become part of the message, so it is reduced to one printable line, see `one_line`.
     """
 
-    lasting: ClassVar[bool] = False
+    permanent: ClassVar[bool] = False
 
     def __init__(self, source: object, finding: str, remedy: str) -> None:
         self.source = one_line(str(source))

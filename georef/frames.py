@@ -1,8 +1,8 @@
-"""THE table of frames: every array of coordinates in this project is in one of these.
+"""Table of coordinate frames: every array of coordinates in this project is in one of these.
 
 An array names its frame where it enters or leaves a function; a `georef.transform.Transform` carries the two frames
-that it joins. Longitude comes before latitude, always. All right-handed frames keep a solid's outside outside;
-only IMAGE, whose rows run downwards, does not have a third axis at all.
+that it joins. Longitude always comes before latitude. All solid frames are right-handed, so transforms between them
+preserve orientation; IMAGE, whose rows run downwards, has no third axis.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ class Frame:
 
     name : upper-case identifier, unique
     unit : unit of the coordinates, in their order where they differ
-    axes : what grows along the first, second and third coordinate; two entries for a plane
+    axes : direction in which the first, second and third coordinate grow; two entries for a plane
     handedness : "right" for right-handed solid frames (curvilinear ones by east, north, up), "none" for planes
-    notes : origin and whatever else must be known to read the numbers
+    notes : origin and anything else needed to interpret the numbers
     """
 
     name: str

@@ -1,9 +1,10 @@
-"""Geodetic and earth-centred coordinates, the local frame at a place, and how a figure stands in it.
+"""Geodetic and earth-centred coordinates, the local ENU frame at a place, and the transforms of a placed figure.
 
-All of it in float64. pyproj does the geodesy and is imported on first use, so that importing this module is cheap.
+All computations are in float64. pyproj does the geodesy and is imported on first use, so that importing this module is
+cheap.
 
-Turning, once and for all. ASSET (glTF) has its front along +Z; 3D Tiles turns y-up content by (x, y, z) to
-(x, -z, y), which puts the front along -y of the TILE frame: an unturned tile in an ENU frame faces south, bearing
+Orientation convention: ASSET (glTF) has its front along +Z; 3D Tiles rotates y-up content by (x, y, z) to
+(x, -z, y), which puts the front along -y of the TILE frame: an unrotated tile in an ENU frame faces south, bearing
 180. Bearings run clockwise, rotations about the up axis counter-clockwise, so a nose bearing B needs the rotation
 by 180 - B (clockwise: by B - 180).
 """
@@ -37,7 +38,7 @@ _E2 = WGS84_F * (2.0 - WGS84_F)
 def _ecef_from_geodetic() -> Transformer:
     from pyproj import Transformer
 
-    # A conversion on one datum, with no grid in it: allow_ballpark=False states that it must stay one.
+    # A conversion on one datum, with no grid in it: allow_ballpark=False makes sure of that.
     return Transformer.from_crs("EPSG:4979", "EPSG:4978", always_xy=True, allow_ballpark=False)
 
 
@@ -50,7 +51,7 @@ def _converted(points: ArrayLike, direction: str, name: str) -> FloatArray:
     bad = ~np.isfinite(result).all(axis=-1)
     if bad.any():
         first = rows[bad][0].tolist()
-        raise PlacementError(name, f"{first} is no place", "give finite coordinates with latitudes in -90..90")
+        raise PlacementError(name, f"{first} is not on the earth", "give finite coordinates with latitudes in -90..90")
     if direction == "INVERSE":
         result = _refined(result, rows)
     shaped: FloatArray = result.reshape(array.shape)
@@ -58,14 +59,14 @@ def _converted(points: ArrayLike, direction: str, name: str) -> FloatArray:
 
 
 def _refined(geodetic: FloatArray, ecef: FloatArray) -> FloatArray:
-    # PROJ inverts with one step of Bowring's method. Measured with PROJ 9.5.1: off by 3e-6 m beside the poles,
-    # 7e-7 m at 9 km of height, 1.3e-4 m at 100 km. One Newton step, from the miss in the local meridian plane,
-    # takes that to a few float64 steps; the longitude is exact as it is.
-    miss = ecef - np.stack(_ecef_from_geodetic().transform(*geodetic.T), axis=-1)
+    # PROJ inverts with one step of Bowring's method. Measured with PROJ 9.5.1: off by 3e-6 m near the poles,
+    # 7e-7 m at 9 km of height, 1.3e-4 m at 100 km. One Newton step, from the residual in the local meridian plane,
+    # reduces that to a few float64 steps; the longitude is already exact.
+    residual = ecef - np.stack(_ecef_from_geodetic().transform(*geodetic.T), axis=-1)
     lon, lat = np.radians(geodetic[:, :2].T)
-    outward = np.cos(lon) * miss[:, 0] + np.sin(lon) * miss[:, 1]
-    north = np.cos(lat) * miss[:, 2] - np.sin(lat) * outward
-    up = np.sin(lat) * miss[:, 2] + np.cos(lat) * outward
+    outward = np.cos(lon) * residual[:, 0] + np.sin(lon) * residual[:, 1]
+    north = np.cos(lat) * residual[:, 2] - np.sin(lat) * outward
+    up = np.sin(lat) * residual[:, 2] + np.cos(lat) * outward
     meridian_radius = WGS84_A_M * (1.0 - _E2) / (1.0 - _E2 * np.sin(lat) ** 2) ** 1.5
     refined = geodetic.copy()
     refined[:, 1] = np.clip(refined[:, 1] + np.degrees(north / (meridian_radius + geodetic[:, 2])), -90.0, 90.0)
@@ -89,17 +90,17 @@ def geodetic_from_ecef(points: ArrayLike) -> FloatArray:
 
     points : (N, 3) or (3,), ECEF, metres
     returns : same shape, float64, GEODETIC: longitude in [-180, 180] and latitude in degrees, ellipsoidal height in
-        metres (EPSG:4978 to EPSG:4979); on the earth's axis the longitude means nothing
+        metres (EPSG:4978 to EPSG:4979); on the earth's axis the longitude is undefined
 
-    Accurate to float64 rounding from far below the sea to satellites; not meant for the earth's core.
+    Accurate to float64 rounding from far below sea level to satellite orbits; not meant for the earth's core.
     Raises PlacementError for numbers that are not finite.
     """
     return _converted(points, "INVERSE", "ECEF coordinates")
 
 
 def _sin_cos_deg(angle_deg: float) -> tuple[float, float]:
-    # Exact at multiples of 90 degrees, where sin(pi) is 1e-16: the poles, the antimeridian and the compass's main
-    # points give clean matrices, and -180 and 180 the same one.
+    # Exact at multiples of 90 degrees, where sin(pi) is 1e-16: the poles, the antimeridian and the cardinal
+    # directions give clean matrices, and -180 and 180 the same one.
     rest = math.remainder(angle_deg, 90.0)
     quarter = round((angle_deg - rest) / 90.0) % 4
     sin, cos = math.sin(math.radians(rest)), math.cos(math.radians(rest))
@@ -107,12 +108,12 @@ def _sin_cos_deg(angle_deg: float) -> tuple[float, float]:
 
 
 def enu_at(lon_deg: float, lat_deg: float, height_m: float = 0.0) -> Transform:
-    """The transform ECEF from ENU at a place, a rotation and a translation.
+    """Transform ECEF from ENU at a place: a rotation and a translation.
 
     lon_deg, lat_deg : GEODETIC, degrees, in [-180, 180] and [-90, 90]
     height_m : above the ellipsoid, metres
 
-    At a pole east and north follow the given longitude: north is the limit of going there along that meridian.
+    At a pole, east and north follow the given longitude: north is the limit along that meridian.
     Raises PlacementError for a place that does not exist.
     https://proj.org/en/stable/operations/conversions/topocentric.html
     """
@@ -128,7 +129,7 @@ def enu_at(lon_deg: float, lat_deg: float, height_m: float = 0.0) -> Transform:
 
 
 def tile_from_asset() -> Transform:
-    """The y-up to z-up turn (x, y, z) to (x, -z, y) that 3D Tiles does to glTF content.
+    """Rotation from y-up to z-up, (x, y, z) to (x, -z, y), that 3D Tiles applies to glTF content.
 
     https://docs.ogc.org/cs/22-025r4/22-025r4.html#core-gltf-transforms
     """
@@ -136,7 +137,7 @@ def tile_from_asset() -> Transform:
 
 
 def enu_from_tile(placement: GeoPlacement) -> Transform:
-    """The rotation about the up axis after which the nose points to `placement.heading_deg`."""
+    """Rotation about the up axis after which the nose points to `placement.heading_deg`."""
     sin, cos = _sin_cos_deg(180.0 - placement.heading_deg)
     matrix = np.eye(4)
     matrix[:2, :2] = ((cos, -sin), (sin, cos))
@@ -144,17 +145,17 @@ def enu_from_tile(placement: GeoPlacement) -> Transform:
 
 
 def ecef_from_tile(placement: GeoPlacement) -> Transform:
-    """The transform for a 3D Tiles root tile whose content is in the ASSET frame; `column_major` writes it out."""
+    """Transform of a 3D Tiles root tile whose content is in the ASSET frame; `column_major` serialises it."""
     return enu_at(placement.lon_deg, placement.lat_deg, placement.height_m) @ enu_from_tile(placement)
 
 
 def ecef_from_asset(placement: GeoPlacement) -> Transform:
-    """Where on the earth the asset's vertices come to lie: `ecef_from_tile` after `tile_from_asset`."""
+    """Transform of the asset's vertices to ECEF: `ecef_from_tile` after `tile_from_asset`."""
     return ecef_from_tile(placement) @ tile_from_asset()
 
 
 def nose_bearing_deg(transform: Transform) -> float:
-    """The compass bearing of the figure's front, read back from a transform.
+    """Compass bearing of the figure's front, read back from a transform.
 
     transform : target ENU or ECEF, source ASSET or TILE
     returns : degrees clockwise from north in [0, 360). From ECEF the place is taken from the transform's origin,
@@ -176,8 +177,8 @@ def nose_bearing_deg(transform: Transform) -> float:
 
 
 def cesium_entity_heading_deg(placement: GeoPlacement) -> float:
-    """The heading for a CesiumJS Entity or Model of the asset, degrees in [0, 360): it faces east at heading 0.
+    """Heading of a CesiumJS Entity or Model of the asset, degrees in [0, 360): it faces east at heading 0.
 
-    Not for tilesets, which face south unturned: use `ecef_from_tile` there.
+    Not for tilesets, which face south unrotated: use `ecef_from_tile` there.
     """
     return normalized_bearing(placement.heading_deg - 90.0)

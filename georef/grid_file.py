@@ -1,5 +1,5 @@
-"""What heads of geoid grids say, before PROJ reads them: its reader of GeoTIFF divides by what may be zero there,
-which ends the process.
+"""Validation of the headers of geoid grids before PROJ reads them: its GeoTIFF reader may divide by zero there,
+which kills the process.
 
 https://vdatum.noaa.gov/docs/gtx_info.html
 https://proj.org/en/stable/specifications/geodetictiffgrids.html
@@ -14,17 +14,17 @@ from pathlib import Path
 from typing import BinaryIO
 
 MAX_SIDE = 100_000
-"""Nodes along a side of a grid: 13 seconds of arc all round the earth."""
+"""Nodes along a side of a grid: a resolution of 13 arc seconds around the whole earth."""
 
 MAX_BLOCK_BYTES = 64 << 20
-"""A tile or strip, unpacked: what is kept of it in memory."""
+"""Size of a decompressed tile or strip, which is kept in memory."""
 
 MAX_GRIDS = 1000
 """Grids in one file, each a directory of the TIFF."""
 
 MAX_ENTRIES = 200
 
-WIDTH, HEIGHT, BITS, ROWS_A_STRIP, SAMPLES = 256, 257, 258, 278, 277
+WIDTH, HEIGHT, BITS, ROWS_PER_STRIP, SAMPLES = 256, 257, 258, 278, 277
 TILE_WIDTH, TILE_HEIGHT, STRIP_OFFSETS, STRIP_BYTES, TILE_OFFSETS, TILE_BYTES = 322, 323, 273, 279, 324, 325
 PLANAR = 284
 
@@ -33,9 +33,9 @@ _WHOLE = {1: "B", 3: "H", 4: "I", 13: "I", 16: "Q"}
 
 
 def check_grid(path: Path) -> None:
-    """Raise ValueError for a grid file whose head is damaged; OSError where it cannot be read.
+    """Raise ValueError for a grid file whose header is damaged; OSError where it cannot be read.
 
-    path : by its suffix a .gtx, or else a TIFF
+    path : a .gtx by its suffix, otherwise a TIFF
     """
     with path.open("rb") as stream:
         size = stream.seek(0, 2)
@@ -48,43 +48,45 @@ def check_grid(path: Path) -> None:
 
 def _check_gtx(head: bytes, size: int) -> None:
     if len(head) < 40:
-        raise ValueError(f"{size} bytes, less than the head of a GTX grid")
+        raise ValueError(f"{size} bytes, less than the header of a GTX grid")
     south, west, step_lat, step_lon, rows, columns = struct.unpack(">4d2i", head)
     if not (0 < rows <= MAX_SIDE and 0 < columns <= MAX_SIDE and size >= 40 + 4 * rows * columns):
-        raise ValueError(f"its head says {rows} rows of {columns} nodes, it has {size} bytes")
+        raise ValueError(f"its header declares {rows} rows of {columns} nodes, but the file has {size} bytes")
     if not (0 < step_lat <= 180 and 0 < step_lon <= 360 and abs(south) <= 90 and abs(west) <= 360):
-        raise ValueError(f"its head says a corner at {west:g} {south:g} and steps of {step_lon:g} {step_lat:g} degrees")
+        raise ValueError(
+            f"its header declares a corner at {west:g} {south:g} and steps of {step_lon:g} {step_lat:g} degrees"
+        )
 
 
 def _check_tiff(stream: BinaryIO, size: int) -> None:
     head = stream.read(16)
     order = {b"II": "<", b"MM": ">"}.get(head[:2])
     if order is None or len(head) < 16:
-        raise ValueError("no TIFF")
+        raise ValueError("not a TIFF file")
     version = struct.unpack_from(order + "H", head, 2)[0]
     if version not in (42, 43):
-        raise ValueError("no TIFF")
+        raise ValueError("not a TIFF file")
     big = version == 43
-    place = struct.unpack_from(order + "Q", head, 8)[0] if big else struct.unpack_from(order + "I", head, 4)[0]
-    seen: set[int] = set()
-    while place:
-        if place in seen or len(seen) >= MAX_GRIDS:
-            raise ValueError(f"more than {MAX_GRIDS} grids, or directories in a circle")
-        seen.add(place)
-        entries, place = _directory(stream, place, order, big, size)
+    offset = struct.unpack_from(order + "Q", head, 8)[0] if big else struct.unpack_from(order + "I", head, 4)[0]
+    visited: set[int] = set()
+    while offset:
+        if offset in visited or len(visited) >= MAX_GRIDS:
+            raise ValueError(f"more than {MAX_GRIDS} grids, or a cycle of directories")
+        visited.add(offset)
+        entries, offset = _directory(stream, offset, order, big, size)
         _check_blocks(entries)
-    if not seen:
+    if not visited:
         raise ValueError("a TIFF without a directory")
 
 
 Entries = dict[int, tuple[int, int | None]]
-"""Tag → number of its values, and the first one where it is a whole number."""
+"""Tag → number of its values, and the first value where it is an integer."""
 
 
-def _directory(stream: BinaryIO, place: int, order: str, big: bool, size: int) -> tuple[Entries, int]:
-    """The entries of a directory, and where the next one is, 0 after the last."""
+def _directory(stream: BinaryIO, start: int, order: str, big: bool, size: int) -> tuple[Entries, int]:
+    """Entries of a directory, and the offset of the next one, 0 after the last."""
     count_kind, entry_kind, word = ("Q", "HHQ", 8) if big else ("H", "HHI", 4)
-    stream.seek(min(place, size))
+    stream.seek(min(start, size))
     count = _unpacked(stream, order + count_kind)[0]
     if count > MAX_ENTRIES:
         raise ValueError(f"a directory of {count} entries")
@@ -93,13 +95,13 @@ def _directory(stream: BinaryIO, place: int, order: str, big: bool, size: int) -
         tag, kind, number = _unpacked(stream, order + entry_kind)
         value = stream.read(word)
         if len(value) < word:
-            raise ValueError("the file is cut off")
+            raise ValueError("the file is truncated")
         length = _SIZES.get(kind, 1) * number
         offset = struct.unpack(order + ("Q" if big else "I"), value)[0]
         if length > word and offset + length > size:
             raise ValueError(f"tag {tag} ends at byte {offset + length} of {size}")
         if tag in entries:
-            raise ValueError(f"tag {tag} twice")
+            raise ValueError(f"duplicate tag {tag}")
         first = None
         if number >= 1 and kind in _WHOLE:
             if length <= word:
@@ -116,7 +118,7 @@ def _directory(stream: BinaryIO, place: int, order: str, big: bool, size: int) -
 def _unpacked(stream: BinaryIO, kind: str) -> tuple[int, ...]:
     data = stream.read(struct.calcsize(kind))
     if len(data) < struct.calcsize(kind):
-        raise ValueError("the file is cut off")
+        raise ValueError("the file is truncated")
     return struct.unpack(kind, data)
 
 
@@ -132,7 +134,7 @@ def _check_blocks(entries: Entries) -> None:
     if tiled:
         across, down = first(TILE_WIDTH), first(TILE_HEIGHT)
     else:
-        across, down = width, min(first(ROWS_A_STRIP), height)
+        across, down = width, min(first(ROWS_PER_STRIP), height)
     planes = samples if first(PLANAR, 1) == 2 else 1
     if not (0 < across <= 2 * MAX_SIDE and 0 < down <= 2 * MAX_SIDE):
         raise ValueError(f"blocks of {across} x {down} nodes")
@@ -141,4 +143,4 @@ def _check_blocks(entries: Entries) -> None:
     blocks = math.ceil(width / across) * math.ceil(height / down) * planes
     for tag in (TILE_OFFSETS, TILE_BYTES) if tiled else (STRIP_OFFSETS, STRIP_BYTES):
         if entries.get(tag, (0, None))[0] < blocks:
-            raise ValueError(f"{entries.get(tag, (0, None))[0]} blocks of the {blocks} that its size needs")
+            raise ValueError(f"{entries.get(tag, (0, None))[0]} of {blocks} blocks")

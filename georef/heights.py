@@ -1,8 +1,8 @@
-"""Altitudes above the sea to heights above the ellipsoid: h = H + N.
+"""Conversion of altitudes above sea level to heights above the ellipsoid: h = H + N.
 
-H is the altitude in its datum, N the geoid's height above the WGS 84 ellipsoid from a grid, h what globes need.
-N is read by PROJ's `vgridshift` from one grid file named by its full path. Asking pyproj for a transformation
-between two reference systems instead would, where the grid is missing, return H unchanged with only a warning.
+H is the altitude in its datum, N the geoid's height above the WGS 84 ellipsoid from a grid, h the height for globes.
+N is read by PROJ's `vgridshift` from one grid file given by its full path. A pyproj transformation between two
+reference systems would, where the grid is missing, return H unchanged with only a warning.
 https://proj.org/en/stable/operations/transformations/vgridshift.html
 """
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 OPTION = "--altitude-datum"
 
 EGM96_GRID = Path(__file__).parent / "data" / "egm96_15.tif"
-"""The 15' grid of EGM96 that the package brings, in whole millimetres; georef/data/README.md says where it is from."""
+"""The bundled 15' EGM96 grid, in whole millimetres; for its origin see georef/data/README.md."""
 
 GRID_SUFFIXES = (".gtx", ".tif", ".tiff")
 
 MAX_UNDULATION_M = 200.0
-"""No geoid or levelling datum is further from the ellipsoid (EGM96: -107 m to 86 m); a terrain model soon is."""
+"""Largest plausible undulation: geoids and levelling datums stay closer (EGM96: -107 m to 86 m), terrain does not."""
 
 
 def grid_path(datum: str | Path) -> Path | None:
-    """The grid file that a height datum names; None for "ellipsoid", which needs none.
+    """Grid file of a height datum; None for "ellipsoid", which needs none.
 
     datum : "ellipsoid" or "egm96" in any case, or the path of a .gtx or .tif grid
 
@@ -45,16 +45,16 @@ def grid_path(datum: str | Path) -> Path | None:
     path = EGM96_GRID if egm96 else Path(datum)
     if not path.is_file():
         if egm96:
-            raise PlacementError(f"{OPTION} egm96", f"{path} is missing", "install fig2mesh again, or pass a GRIDFILE")
+            raise PlacementError(f"{OPTION} egm96", f"{path} is missing", "reinstall fig2mesh, or give a grid file")
         raise PlacementError(
             f"{OPTION} {datum}", "no such file", "give ellipsoid, egm96 or the path of a .gtx or .tif geoid grid"
         )
     if path.suffix.lower() not in GRID_SUFFIXES:
         raise PlacementError(
-            f"{OPTION} {datum}", f"its suffix is {path.suffix!r}", "give a geoid grid as .gtx or GeoTIFF (.tif)"
+            f"{OPTION} {datum}", f"unknown suffix {path.suffix!r}", "give a geoid grid as .gtx or GeoTIFF (.tif)"
         )
-    # Resolved, because PROJ reads a leading @ as "skip me silently if I am missing" and looks relative names up
-    # in its own folders first.
+    # Resolved, because PROJ reads a leading @ as "optional, ignore if missing" and searches its own folders first
+    # for relative names.
     path = path.resolve()
     if any(character in str(path) for character in ',"'):
         raise PlacementError(
@@ -65,11 +65,11 @@ def grid_path(datum: str | Path) -> Path | None:
     return path
 
 
-@functools.lru_cache(maxsize=16)  # each keeps its file open
+@functools.lru_cache(maxsize=16)  # each entry keeps its file open
 def _shift(path: Path, modified_ns: int) -> Transformer:
     from pyproj import Transformer
 
-    # The modification time is only a part of the cache's key: a rewritten grid must not be answered from memory.
+    # The modification time is only part of the cache key: a rewritten grid must not be served from the cache.
     return Transformer.from_pipeline(
         "+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad "
         f'+step +proj=vgridshift +grids="{path}" +multiplier=1 '
@@ -78,14 +78,14 @@ def _shift(path: Path, modified_ns: int) -> Transformer:
 
 
 def undulation_m(lon_deg: float, lat_deg: float, datum: str | Path) -> float:
-    """N, the height of a datum's zero surface above the WGS 84 ellipsoid.
+    """Undulation N, the height of a datum's zero surface above the WGS 84 ellipsoid.
 
     lon_deg, lat_deg : GEODETIC, degrees
     datum : as for `grid_path`
-    returns : metres, bilinear between the grid's nodes; 0 for "ellipsoid"
+    returns : metres, by bilinear interpolation between the grid's nodes; 0 for "ellipsoid"
 
-    Raises PlacementError where the grid is missing or unreadable, has no value there, or holds something that
-    cannot be a geoid.
+    Raises PlacementError where the grid is missing or unreadable, has no value there, or holds a value that
+    is not plausible for a geoid.
     """
     check_lonlat(lon_deg, lat_deg)
     path = grid_path(datum)
@@ -99,7 +99,7 @@ def undulation_m(lon_deg: float, lat_deg: float, datum: str | Path) -> float:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise PlacementError(
-            f"{OPTION} {datum}", f"a damaged grid ({reason})", "give a geoid grid as .gtx or GeoTIFF (.tif)"
+            f"{OPTION} {datum}", f"damaged grid ({reason})", "give a geoid grid as .gtx or GeoTIFF (.tif)"
         ) from error
     except ProjError as error:
         raise PlacementError(
@@ -113,19 +113,19 @@ def undulation_m(lon_deg: float, lat_deg: float, datum: str | Path) -> float:
         raise PlacementError(
             f"{OPTION} {datum}",
             f"the grid has no value at longitude {lon_deg:.10g}, latitude {lat_deg:.10g}",
-            "use a grid that covers the place, or give the altitude above the ellipsoid",
+            "use a grid that covers the location, or give the altitude above the ellipsoid",
         )
     if abs(undulation) > MAX_UNDULATION_M:
         raise PlacementError(
             f"{OPTION} {datum}",
-            f"its value {undulation:.6g} m at the place is no height of a geoid above the ellipsoid",
+            f"its value of {undulation:.6g} m at the location is not a plausible geoid height",
             "give a geoid grid, not a terrain model",
         )
     return undulation
 
 
 def ellipsoidal_height(lon_deg: float, lat_deg: float, altitude_m: float, datum: str | Path = "ellipsoid") -> float:
-    """h, the height above the WGS 84 ellipsoid, of an altitude H in a height datum: h = H + N.
+    """Height h above the WGS 84 ellipsoid of an altitude H in a height datum: h = H + N.
 
     lon_deg, lat_deg : GEODETIC, degrees
     altitude_m : H, metres above the datum's zero surface

@@ -1,8 +1,8 @@
-"""A georeferenced map sheet: from pixels of its picture to places on the earth.
+"""Georeferenced map sheets: conversion of pixels to places on the earth.
 
 The transformation runs from IMAGE to a plane (MAP, or one fitted about the control points), the plane's projection
-from there to GEODETIC. Scale, bearing and distortion at a pixel are measured on the ellipsoid itself, by what one
-pixel up, down, left and right are on the ground: so the convergence of the meridians is in them.
+from there to GEODETIC. Scale, bearing and distortion at a pixel are measured on the ellipsoid itself, by finite
+differences of one pixel, so they include the convergence of the meridians.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from georef.sheets.controls import Affine, Controls, FloatArray, on_picture
 from georef.sheets.find import OPTION, find_georeference
 from georef.sheets.fit import METHODS, Map, fit
 from georef.sheets.hull import convex_hull, nearest_in
-from georef.sheets.quality import Quality, distances_m, quality_of
+from georef.sheets.quality import FitQuality, distances_m, fit_quality
 from georef.sheets.reference import Plane, crs_of, fitting_plane, local_plane, plane_of
 
 if TYPE_CHECKING:
@@ -30,30 +30,29 @@ if TYPE_CHECKING:
 
 TRANSFORMS = ("auto", *METHODS)
 
-COARSE = 0.03
-"""Root mean square residual, as a share of the control points' extent, from which on the points seem not to belong to
-this picture or the reference system not to the sheet: pictorial maps are drawn freely, but not that freely."""
+MAX_RESIDUAL_SHARE = 0.03
+"""Warning threshold: root mean square residual as a share of the control points' extent. Above it, the points or the
+reference system probably do not belong to this sheet: pictorial maps are drawn freely, but not that freely."""
 
+MAX_LON, MAX_LAT = 800.0, 100.0
+"""Larger numbers cannot be angles in degrees or grads, in any reference system."""
 
-MOST_LON, MOST_LAT = 800.0, 100.0
-"""Larger numbers are no angles, in degrees or grads, whatever reference system a file names."""
-
-INACCURATE_M = 1.0
-"""Accuracy of a datum transformation from which on it is told."""
+MAX_SILENT_ACCURACY_M = 1.0
+"""Threshold above which the accuracy of a datum transformation is reported."""
 
 
 @dataclass(frozen=True)
 class SheetPlace:
-    """A pixel of a sheet on the earth.
+    """Place on the earth of a pixel of a sheet.
 
     lon_deg, lat_deg : GEODETIC
     up_bearing_deg : compass bearing of the sheet's "up", degrees clockwise from north, in [0, 360)
     down_bearing_deg : of its "down", towards the reader
-    up_m, across_m : metres on the ground that a pixel is along and across "up"
-    stretch : greatest local scale over the least; 1 where the map is conformal
-    mirrored : the sheet shows the ground as a mirror does
+    up_m, across_m : size of a pixel on the ground along and across "up", metres
+    stretch : ratio of the largest to the smallest local scale; 1 where the map is conformal
+    mirrored : the sheet shows the ground mirrored
     outside_m : distance on the ground to the hull of the control points; 0 inside; None where there are none
-    notes : what is to be told of this place, one line each
+    notes : warnings about this place, one line each
     """
 
     lon_deg: float
@@ -70,14 +69,14 @@ class SheetPlace:
 
 @dataclass(frozen=True)
 class MapSheet:
-    """A picture of a map whose place on the earth is known.
+    """Picture of a map with a known georeference.
 
-    file : what the georeference was read from; picture : None where it is not at hand
-    size : of the picture, px; None where it is not known
+    file : the file that the georeference was read from; picture : None where it is not available
+    size : of the picture, px; None if unknown
     method : of the transformation; "given" where the file has the map itself
-    crs : of the file's coordinates; plane : what the transformation leads to
+    crs : of the file's coordinates; plane : target of the transformation
     pixels : (N, 2) control points, IMAGE; none where the map is given
-    notes : what is to be told of the sheet, one line each
+    notes : warnings about the sheet, one line each
     """
 
     file: Path
@@ -88,24 +87,24 @@ class MapSheet:
     plane: Plane
     to_plane: Map
     pixels: FloatArray
-    quality: Quality | None
+    quality: FitQuality | None
     notes: tuple[str, ...]
 
     def lonlat(self, pixels: FloatArray) -> FloatArray:
         """(N, 2) GEODETIC longitude and latitude, degrees, of (N, 2) IMAGE pixels.
 
-        Raises PlacementError for pixels that are no place on earth.
+        Raises PlacementError for pixels without a place on the earth.
         """
         return self.plane.to_lonlat(self.to_plane(np.asarray(pixels, np.float64).reshape(-1, 2)))
 
     def place(self, x: float, y: float, source: str = "--at") -> SheetPlace:
-        """Where a pixel of the sheet is, and how the sheet lies there.
+        """Place of a pixel of the sheet, with the scale and bearing of the sheet there.
 
         x, y : IMAGE, px
         Raises PlacementError for pixels off the sheet or off the earth, and where the map folds.
         """
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise PlacementError(source, f"{x:g} {y:g} is no pixel", "give finite numbers")
+            raise PlacementError(source, f"{x:g} {y:g} is not a pixel", "give finite numbers")
         if self.size is not None and not (0 <= x <= self.size[0] and 0 <= y <= self.size[1]):
             finding = f"{x:g} {y:g} is not on the sheet of {self.size[0]:g}×{self.size[1]:g} px"
             raise PlacementError(source, finding, "give X from the left and Y from the top, in pixels")
@@ -126,8 +125,8 @@ class MapSheet:
         if outside:
             notes.append(f"{self.file}: {x:g} {y:g} lies {_metres(outside)} outside the control points' hull")
         accuracy = self.plane.accuracy_m()
-        if accuracy is not None and accuracy > INACCURATE_M:
-            notes.append(f"{self.crs}: known to {accuracy:g} m against WGS 84 without grids that are not at hand")
+        if accuracy is not None and accuracy > MAX_SILENT_ACCURACY_M:
+            notes.append(f"{self.crs}: known to {accuracy:g} m against WGS 84 without grids that are not available")
         up = _bearing(-down)
         return SheetPlace(
             lon,
@@ -155,32 +154,32 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     """Read the georeference of a sheet.
 
     sheet : the picture, or a .points file, annotation or world file; see `georef.sheets.find`
-    transform : one of `TRANSFORMS`; auto: what the file asks for, else affine, helmert for two points
-    map_crs : reference system of the sheet's coordinates, where its files name none or a wrong one; for control
+    transform : one of `TRANSFORMS`; auto: that requested by the file, else affine, helmert for two points
+    map_crs : reference system of the sheet's coordinates, where its files give none or a wrong one; for control
         points in longitude and latitude, the projection in which the transformation is fitted
 
-    Raises PlacementError where the georeference is missing, ambiguous, damaged or not enough.
+    Raises PlacementError where the georeference is missing, ambiguous, damaged or insufficient.
     """
     found = find_georeference(sheet)
     notes: list[str] = []
     if isinstance(found.georeference, Affine):
-        return _given(found.georeference, found.file, found.picture, found.size, found.crs, transform, map_crs)
+        return _affine_sheet(found.georeference, found.file, found.picture, found.size, found.crs, transform, map_crs)
     controls = found.georeference
     if found.size is not None:
         controls = on_picture(controls, found.size, found.file)
-    if controls.left_out:
-        notes.append(f"{found.file}: {controls.left_out} control points are switched off")
-    method = _method(controls, transform, found.file, notes)
+    if controls.disabled:
+        notes.append(f"{found.file}: {controls.disabled} control points are disabled")
+    method = _choose_method(controls, transform, found.file, notes)
     crs, plane, coordinates = _plane_for(controls, found.crs, map_crs, found.file, notes)
     fitted = fit(method, controls.pixels, coordinates, found.file)
-    quality = quality_of(fitted, plane, controls.pixels, coordinates)
+    quality = fit_quality(fitted, plane, controls.pixels, coordinates)
     given = plane.to_lonlat(coordinates)
     extent = float(distances_m(given, np.broadcast_to(given[:1], given.shape)).max())
-    worst = max(quality.rmse_m, quality.left_out_rmse_m or 0.0)
-    if worst > COARSE * extent:
+    worst = max(quality.rmse_m, quality.leave_one_out_rmse_m or 0.0)
+    if worst > MAX_RESIDUAL_SHARE * extent:
         notes.append(
-            f"{found.file}: control points are missed by {_metres(worst)}, {worst / extent:.0%} of their extent; "
-            "check points and reference system"
+            f"{found.file}: control point residuals are {_metres(worst)}, {worst / extent:.0%} of their extent; "
+            "check the points and the reference system"
         )
     size = found.size if found.size is not None else controls.size
     return MapSheet(
@@ -188,7 +187,7 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     )
 
 
-def _given(
+def _affine_sheet(
     affine: Affine,
     file: Path,
     picture: Path | None,
@@ -198,10 +197,10 @@ def _given(
     map_crs: str | None,
 ) -> MapSheet:
     if transform != "auto":
-        finding = f"{file.name} gives the map itself, without control points"
-        raise PlacementError(f"--map-transform {transform}", finding, "leave --map-transform away")
+        finding = f"{file.name} gives the affine map itself, without control points"
+        raise PlacementError(f"--map-transform {transform}", finding, "omit --map-transform")
     notes: list[str] = []
-    crs = _chosen(named, map_crs, file, notes)
+    crs = _choose_crs(named, map_crs, file, notes)
     matrix = affine.matrix
     return MapSheet(
         file,
@@ -217,46 +216,46 @@ def _given(
     )
 
 
-def _chosen(named: str | None, map_crs: str | None, file: Path, notes: list[str]) -> CRS:
-    """The reference system of the coordinates: --map-crs, or what the files name."""
+def _choose_crs(named: str | None, map_crs: str | None, file: Path, notes: list[str]) -> CRS:
+    """Reference system of the coordinates: --map-crs, or the one named in the files."""
     if map_crs is None and named is None:
-        finding = "no reference system in it or beside it"
-        raise PlacementError(f"{OPTION} {file}", finding, "pass --map-crs, such as EPSG:2056, or put a .prj beside it")
+        finding = "no reference system in the file or in a .prj file"
+        raise PlacementError(f"{OPTION} {file}", finding, "give --map-crs, such as EPSG:2056, or add a .prj file")
     if map_crs is None:
         return crs_of(str(named), file)
     crs = crs_of(map_crs)
-    own = _own(named, file)
+    own = _named_crs(named, file)
     if own is not None and own != crs:
-        notes.append(f"{file}: names {own.name}; --map-crs is used instead")
+        notes.append(f"{file}: reference system {own.name} is overridden by --map-crs")
     return crs
 
 
-def _own(named: str | None, file: Path) -> CRS | None:
-    """The reference system that the files name; None where they name none that is known."""
+def _named_crs(named: str | None, file: Path) -> CRS | None:
+    """Reference system named in the files; None where they name none or an unknown one."""
     with suppress(PlacementError):
         return None if named is None else crs_of(named, file)
     return None
 
 
-def _method(controls: Controls, transform: str, file: Path, notes: list[str]) -> str:
+def _choose_method(controls: Controls, transform: str, file: Path, notes: list[str]) -> str:
     if transform != "auto":
         return transform
     if controls.method in METHODS:
         return controls.method
     if controls.method is not None:
-        notes.append(f"{file}: its transformation, {controls.method}, is not known here; affine is used")
+        notes.append(f"{file}: unknown transformation {controls.method}; affine is used")
     return "helmert" if len(controls.pixels) == 2 else "affine"
 
 
 def _plane_for(
     controls: Controls, named: str | None, map_crs: str | None, file: Path, notes: list[str]
 ) -> tuple[str, Plane, FloatArray]:
-    """The name of the points' reference system, the plane to fit in, and the points in it."""
-    own = None if map_crs is None else _own(named, file)
-    if own is not None and own.is_geographic and (np.abs(controls.coordinates) <= (MOST_LON, MOST_LAT)).all():
+    """Name of the points' reference system, the plane to fit in, and the points in it."""
+    own = None if map_crs is None else _named_crs(named, file)
+    if own is not None and own.is_geographic and (np.abs(controls.coordinates) <= (MAX_LON, MAX_LAT)).all():
         crs, wanted, source = own, map_crs, "--map-crs"
     else:
-        crs, wanted, source = _chosen(named, map_crs, file, notes), controls.plane, str(file)
+        crs, wanted, source = _choose_crs(named, map_crs, file, notes), controls.plane, str(file)
     plane = plane_of(crs, file)
     if not plane.geographic:
         return crs.name, plane, controls.coordinates
@@ -267,7 +266,7 @@ def _plane_for(
 
 
 def _on_ground(lonlat: FloatArray, lon: float, lat: float) -> FloatArray:
-    """(N, 2) metres east and north of a place, in the plane that touches the ellipsoid there."""
+    """(N, 2) metres east and north of a place, in the tangent plane of the ellipsoid there."""
     ecef = ecef_from_geodetic(np.concatenate([lonlat, np.zeros((len(lonlat), 1))], axis=1))
     return enu_at(lon, lat).inverse().apply(ecef)[:, :2]
 

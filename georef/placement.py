@@ -1,4 +1,4 @@
-"""Where a figure stands and which way it looks."""
+"""Placement of a figure: position and heading."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AltitudeMode = Literal["absolute", "clamp"]
 def check_lonlat(lon_deg: float, lat_deg: float, source: str = "--lonlat") -> None:
     """Raise PlacementError unless both are finite, longitude in [-180, 180] and latitude in [-90, 90] degrees.
 
-    source : where the numbers come from, for the error message
+    source : origin of the numbers, for the error message
     """
     if not (math.isfinite(lon_deg) and math.isfinite(lat_deg)):
         raise PlacementError(source, f"not a finite number in {(lon_deg, lat_deg)}", "give finite numbers")
@@ -29,15 +29,15 @@ def check_lonlat(lon_deg: float, lat_deg: float, source: str = "--lonlat") -> No
 
 @dataclass(frozen=True)
 class GeoPlacement:
-    """A figure's place on the WGS 84 ellipsoid.
+    """Position and heading of a figure on the WGS 84 ellipsoid.
 
     lon_deg, lat_deg : GEODETIC, degrees; longitude in [-180, 180], latitude in [-90, 90]
     height_m : height of the feet above the ellipsoid, metres
-    height_datum : what the height was given in before conversion: "ellipsoid", "egm96" or a grid's file name
+    height_datum : datum in which the height was given before conversion: "ellipsoid", "egm96" or a grid's file name
     heading_deg : compass bearing the nose points to, degrees clockwise from north, in [0, 360)
     figure_height_m : height of the drawn figure, metres
-    altitude_mode : "absolute", the feet are at `height_m`; "clamp", they are `height_m` above whatever terrain the
-        client shows there, where the format knows such a thing (CZML)
+    altitude_mode : "absolute", the feet are at `height_m`; "clamp", they are `height_m` above the terrain that
+        the client shows there, where the format supports it (CZML)
     """
 
     lon_deg: float
@@ -54,7 +54,9 @@ class GeoPlacement:
             raise PlacementError("placement", f"not a finite number in {values}", "give finite numbers")
         check_lonlat(self.lon_deg, self.lat_deg)
         if self.figure_height_m <= 0:
-            raise PlacementError("--height-m", f"{self.figure_height_m:g} m", "give a positive height in metres")
+            raise PlacementError(
+                "--height-m", f"{self.figure_height_m:g} m is not positive", "give a positive height in metres"
+            )
         if self.altitude_mode not in get_args(AltitudeMode):
-            raise PlacementError("--altitude-mode", f"{self.altitude_mode!r}", "give absolute or clamp")
+            raise PlacementError("--altitude-mode", f"unknown mode {self.altitude_mode!r}", "give absolute or clamp")
         object.__setattr__(self, "heading_deg", normalized_bearing(self.heading_deg))

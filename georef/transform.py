@@ -1,7 +1,7 @@
-"""Affine transforms that know their frames.
+"""Affine transforms tagged with their frames.
 
 A transform reads `target_from_source`, so equal frames touch: `ecef_from_enu @ enu_from_tile @ tile_from_asset`
-is an `ecef_from_asset`, and joining two frames that differ is an error instead of a figure in the wrong place.
+is an `ecef_from_asset`, and composing transforms whose frames do not match is an error instead of a misplaced figure.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ class Transform:
         return Transform(self.target, other.source, self.matrix @ other.matrix)
 
     def inverse(self) -> Transform:
-        """The transform source_from_target. Raises ValueError where the matrix flattens space."""
+        """Return the transform source_from_target. Raises ValueError where the matrix is singular."""
         matrix = np.eye(4)
         try:
-            # The 3x3 block alone: beside an ECEF translation of 6e6 m a 4x4 solve would lose digits of the rotation.
+            # The 3x3 block alone: with an ECEF translation of 6e6 m a 4x4 solve would lose digits of the rotation.
             matrix[:3, :3] = np.linalg.inv(self.matrix[:3, :3])
         except np.linalg.LinAlgError as error:
             raise ValueError(f"{self.target}_from_{self.source}: matrix has no inverse") from error
@@ -68,7 +68,7 @@ class Transform:
         return Transform(self.source, self.target, matrix)
 
     def apply(self, points: ArrayLike) -> FloatArray:
-        """Points in `source` as points in `target`.
+        """Transform points from `source` to `target`.
 
         points : (N, 3) or (3,), any real dtype, source frame; not changed
         returns : same shape, float64, target frame
@@ -76,10 +76,10 @@ class Transform:
         return self.apply_vectors(points) + self.matrix[:3, 3]
 
     def apply_vectors(self, vectors: ArrayLike) -> FloatArray:
-        """Directions or differences in `source` as such in `target`: the translation does not act on them.
+        """Transform directions or differences from `source` to `target`, without the translation.
 
-        vectors : (N, 3) or (3,), any real dtype, source frame; not changed. Surface normals may pass through
-            here only if the transform keeps angles.
+        vectors : (N, 3) or (3,), any real dtype, source frame; not changed. Surface normals may be
+            transformed this way only if the transform preserves angles.
         returns : same shape, float64, target frame
         """
         array = np.asarray(vectors, dtype=np.float64)
@@ -90,9 +90,9 @@ class Transform:
 
 
 def column_major(transform: Transform) -> list[float]:
-    """The 16 numbers of a transform column by column, as glTF `matrix` and 3D Tiles `transform` want them.
+    """Return the 16 numbers of a transform column by column, as in glTF `matrix` and 3D Tiles `transform`.
 
     https://docs.ogc.org/cs/22-025r4/22-025r4.html#core-tile-transforms
     """
-    # Adding zero turns -0.0 into 0.0: the same place must not be written in two ways.
+    # Adding zero turns -0.0 into 0.0: equal transforms must be written identically.
     return [float(value) + 0.0 for value in transform.matrix.T.ravel()]

@@ -51,6 +51,6 @@ def blender(script: Path, job: Any, seconds: int = 300) -> str:
 
 
 def looked_at(file: Path, picture: Path | None = None, size: tuple[int, int] = (120, 200)) -> dict[str, Any]:
-    """What Blender finds in a file, see tests/clients/blender_look.py."""
+    """What Blender finds in a file, see tests/clients/blender_import.py."""
     job = {"file": str(file), "picture": None if picture is None else str(picture), "size": size}
-    return dict(json.loads(blender(CLIENTS / "blender_look.py", job).splitlines()[-1]))
+    return dict(json.loads(blender(CLIENTS / "blender_import.py", job).splitlines()[-1]))

@@ -32,7 +32,7 @@ JOINTS = {
     "l_ankle": (126, 272), "r_ankle": (74, 272), "l_foot": (134, 282), "r_foot": (66, 282),
 }
 # fmt: on
-"""IMAGE pixels on a picture of 200 x 300; a figure seen from the front, arms and legs apart."""
+"""IMAGE pixels on a picture of 200 x 300; a figure from the front, arms and legs apart."""
 
 SIZE = (200, 300)
 
@@ -166,7 +166,7 @@ class Sketch:
 
 @dataclass(frozen=True)
 class Assembled:
-    """A drawn figure on the road without networks: its parts, the body that they make, the body's surface.
+    """A drawn figure, converted without networks: its parts, the body that they make, the body's surface.
 
     mesh : FIGURE, whose units are the metres of a figure 1.79 m high
     """

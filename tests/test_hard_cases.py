@@ -22,9 +22,9 @@ def test_every_case_is_in_the_table_as_it_is(module: str) -> None:
     assert tests
     for name, test in tests.items():
         case: Case = next(mark.args[0] for mark in test.pytestmark if mark.name == "hard_case")
-        title, *told, _ = cells(Row(module, name, case))
+        title, *texts, _ = cells(Row(module, name, case))
         assert f"| {title}" in document
-        for cell in told:
+        for cell in texts:
             assert f"| {cell} |" in document, f"{name} has changed: write the table again"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -75,35 +75,106 @@ def test_the_scan_sees_every_way_of_importing(source):
     assert not offences("import numpy\nfrom georef.frames import ENU\nfrom . import errors", "georef")
 
 
-KNOWN_CYCLES = {("parse", "convert"), ("batch", "commands")}
-"""Imports between folders of fig2mesh that are not counted: logging of jobs, and the options that rows may set."""
+# fmt: off
+LAYERS = (
+    ("georef",),
+    ("exporters",),
+    ("counters", "errors", "settings", "skeleton", "terminal"),
+    ("records", "nets"),
+    ("image_frame", "field", "parse"),
+    ("asset_frame", "parts", "pose"),
+    ("texture",),
+    ("mesh",),
+    ("stages", "measure", "training"),
+    ("conversion",),
+    ("fig2mesh", "batch", "evaluate", "render", "view"),
+    ("annotate", "globe", "tradeoff"),
+    ("commands",),
+    ("__main__",),
+)
+# fmt: on
+"""Folders and modules of fig2mesh, and the packages below it, from the bottom up: each imports only from below.
+
+"fig2mesh" is the front door, `fig2mesh/__init__.py`. Modules of one folder may import each other, one way.
+"""
 
 
-def folder_imports() -> dict[str, set[str]]:
-    """Folder of fig2mesh → the others that its modules import, inside functions too."""
-    graph: dict[str, set[str]] = {}
-    for path in sorted((ROOT / "fig2mesh").rglob("*.py")):
-        folder = path.relative_to(ROOT / "fig2mesh").parts[0].removesuffix(".py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fig2mesh."):
-                other = node.module.split(".")[1]
-                if other != folder and (folder, other) not in KNOWN_CYCLES:
-                    graph.setdefault(folder, set()).add(other)
-    return graph
+def modules() -> dict[str, Path]:
+    """File of each module of the three packages, by its dotted name."""
+    found = {}
+    for package in FORBIDDEN:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            parts = path.relative_to(ROOT).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
 
 
-def test_folders_import_each_other_one_way_only():
-    left = folder_imports()
-    assert {"nets", "parts", "convert"} <= set(left)
+def imported_modules(source: str, known: Collection[str]) -> set[str]:
+    """Those of the known modules that a source imports, inside functions and TYPE_CHECKING too."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            for alias in node.names:
+                whole = f"{node.module}.{alias.name}"
+                found.add(whole if whole in known else node.module)
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return found & set(known)
+
+
+def import_graph() -> dict[str, set[str]]:
+    """Modules that each module imports."""
+    files = modules()
+    return {name: imported_modules(path.read_text("utf-8"), files) - {name} for name, path in files.items()}
+
+
+def cycle_in(graph: dict[str, set[str]]) -> list[str]:
+    """Modules that import each other, directly or not; empty where there are none."""
+    left = dict(graph)
     while left:
-        free = [folder for folder, others in left.items() if not others & set(left)]
-        assert free, f"these import each other: {', '.join(sorted(left))}"
-        for folder in free:
-            del left[folder]
+        free = [name for name, others in left.items() if not others & left.keys()]
+        if not free:
+            return sorted(left)
+        for name in free:
+            del left[name]
+    return []
 
 
-def test_stages_do_not_import_what_stands_above_them():
-    above = {"commands", "convert", "measure", "evaluate", "training", "batch", "render", "view"}
-    graph = folder_imports()
-    for folder in ("parse", "parts", "nets", "pose", "texture", "mesh", "field"):
-        assert not graph[folder] & above, folder
+def test_no_two_modules_import_each_other():
+    assert not cycle_in(import_graph())
+    assert cycle_in({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}, "e": set()}) == ["a", "b", "c", "d"]
+
+
+def layer_name(module: str) -> str:
+    parts = module.split(".")
+    return parts[1] if parts[0] == "fig2mesh" and len(parts) > 1 else parts[0]
+
+
+def test_layers_import_only_from_below():
+    height = {name: number for number, layer in enumerate(LAYERS) for name in layer}
+    graph = import_graph()
+    assert {layer_name(module) for module in graph} == set(height)
+    found = [
+        f"{module} imports {other}"
+        for module, others in graph.items()
+        for other in others
+        if layer_name(other) != layer_name(module) and height[layer_name(other)] >= height[layer_name(module)]
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_no_crowds():
+    """Few loose modules, and folders that can be taken in at a glance."""
+    folders = [path for package in FORBIDDEN for path in (ROOT / package).rglob("*") if (path / "__init__.py").exists()]
+    counts = {path.relative_to(ROOT).as_posix(): len(list(path.glob("*.py"))) for path in folders}
+    assert len(list((ROOT / "fig2mesh").glob("*.py"))) <= 10
+    assert all(count <= 27 for count in counts.values()), counts
+
+
+def test_classes_have_names_of_their_own():
+    found: dict[str, list[str]] = {}
+    for name, path in modules().items():
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(name)
+    assert not {name: places for name, places in found.items() if len(places) > 1}

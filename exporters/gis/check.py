@@ -1,4 +1,4 @@
-"""Checks of GeoJSON and CZML: structure, places that exist, models that are there and say the same place.
+"""Checks of GeoJSON and CZML: structure, valid coordinates, existing models at the same place.
 
 https://www.rfc-editor.org/rfc/rfc7946
 https://github.com/AnalyticalGraphicsInc/czml-writer/wiki/CZML-Structure
@@ -20,11 +20,11 @@ from exporters.georeference import placement_of_record
 from exporters.gis.czml import entity_quaternion, height_reference
 from exporters.gltf.reader import open_glb
 from exporters.tiles.check import PLACE_TOLERANCE_M, TURN_TOLERANCE_DEG
-from exporters.tiles.volumes import numbers
+from exporters.tiles.volumes import is_number_list
 from georef.geodesy import ecef_from_geodetic
 from georef.placement import GeoPlacement
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.json_file import is_there, read_json
+from georef.untrusted.json_file import is_plain_file, read_json
 from georef.untrusted.json_shape import check_shape
 
 # fmt: off
@@ -32,7 +32,7 @@ GEOMETRIES = {
     "Point": 0, "MultiPoint": 1, "LineString": 1, "MultiLineString": 2, "Polygon": 2, "MultiPolygon": 3,
 }
 # fmt: on
-"""Kinds of geometry, and how many lists deep their positions are."""
+"""Geometry types, and the nesting depth of their positions."""
 
 # fmt: off
 HEIGHT_REFERENCES = {
@@ -47,7 +47,7 @@ def _document(path: Path) -> Any:
 
 
 def check_geojson(path: Path) -> list[Finding]:
-    """Findings about a GeoJSON file."""
+    """Check a GeoJSON file."""
     try:
         document = _document(path)
     except ExportError as error:
@@ -65,7 +65,7 @@ def _geojson(item: Any, path: Path, where: str) -> Iterator[Finding]:
             if isinstance(each, dict) and each.get("type") == "Feature":
                 yield from _geojson(each, path, f"{where}: features/{index}")
             else:
-                yield Finding("error", "FEATURES", "is no Feature", f"{where}: features/{index}")
+                yield Finding("error", "FEATURES", "not a Feature", f"{where}: features/{index}")
     elif kind == "Feature":
         if "geometry" not in item or not isinstance(item.get("properties", 0), dict | None):
             yield Finding("error", "FEATURE", "a Feature needs geometry and properties, or null for them", where)
@@ -81,17 +81,17 @@ def _geojson(item: Any, path: Path, where: str) -> Iterator[Finding]:
     elif kind in GEOMETRIES:
         yield from _positions(item.get("coordinates"), GEOMETRIES[kind], where)
     else:
-        yield Finding("error", "TYPE", f"type {kind!r} is none of GeoJSON", where)
+        yield Finding("error", "TYPE", f"type {kind!r} is not a GeoJSON type", where)
     if isinstance(item, dict) and "crs" in item:
-        yield Finding("warning", "CRS", "crs is not of RFC 7946: coordinates are WGS 84", where)
+        yield Finding("warning", "CRS", "crs is not part of RFC 7946: coordinates are WGS 84", where)
 
 
 def _positions(values: Any, depth: int, where: str) -> Iterator[Finding]:
     if depth and isinstance(values, list):
         for each in values:
             yield from _positions(each, depth - 1, where)
-    elif depth or not isinstance(values, list) or not numbers(values, len(values)) or len(values) < 2:
-        yield Finding("error", "COORDINATES", "coordinates are no lists of numbers as its type wants them", where)
+    elif depth or not isinstance(values, list) or not is_number_list(values, len(values)) or len(values) < 2:
+        yield Finding("error", "COORDINATES", "coordinates are not lists of numbers of the depth of its type", where)
     else:
         yield from _range(values, where)
 
@@ -99,7 +99,7 @@ def _positions(values: Any, depth: int, where: str) -> Iterator[Finding]:
 def _range(values: list[Any], where: str) -> Iterator[Finding]:
     if abs(values[0]) > 180 or abs(values[1]) > 90:
         swapped = "; latitude first?" if abs(values[0]) <= 90 and abs(values[1]) <= 180 else ""
-        yield Finding("error", "LONLAT", f"{values[:2]} is no longitude and latitude in degrees{swapped}", where)
+        yield Finding("error", "LONLAT", f"{values[:2]} is not a longitude and latitude in degrees{swapped}", where)
 
 
 def _model_of_feature(item: dict[str, Any], path: Path, where: str) -> Iterator[Finding]:
@@ -123,12 +123,12 @@ def _model_of_feature(item: dict[str, Any], path: Path, where: str) -> Iterator[
 
 
 def _placement(uri: str, path: Path, where: str) -> tuple[GeoPlacement | None, list[Finding]]:
-    """The place that a model records, None if it records none or is elsewhere, and findings about the reference."""
+    """Placement recorded in a model, None if there is none or the model is remote, and findings about the reference."""
     if uri.startswith(("http:", "https:", "data:", "//")):
-        return None, [Finding("info", "NOT_CHECKED", f"model {uri[:60]} is elsewhere", where)]
+        return None, [Finding("info", "NOT_CHECKED", f"model {uri[:60]} is remote and not checked", where)]
     file = path.parent / unquote(uri)
-    if not is_there(file):
-        return None, [Finding("error", "REFERENCE", f"model {uri!r} is not there", where)]
+    if not is_plain_file(file):
+        return None, [Finding("error", "REFERENCE", f"model {uri!r} not found", where)]
     if file.suffix.lower() != ".glb":
         return None, []
     try:
@@ -139,14 +139,14 @@ def _placement(uri: str, path: Path, where: str) -> tuple[GeoPlacement | None, l
 
 
 def _same_place(lon_lat_height: list[float], place: GeoPlacement, where: str) -> Iterator[Finding]:
-    wanted = ecef_from_geodetic([place.lon_deg, place.lat_deg, place.height_m])
-    away = float(np.linalg.norm(ecef_from_geodetic(lon_lat_height) - wanted))
+    expected = ecef_from_geodetic([place.lon_deg, place.lat_deg, place.height_m])
+    away = float(np.linalg.norm(ecef_from_geodetic(lon_lat_height) - expected))
     if away > PLACE_TOLERANCE_M:
-        yield Finding("error", "PLACE", f"is {away:.3g} m from the place that its model records", where)
+        yield Finding("error", "PLACE", f"{away:.3g} m from the place recorded in its model", where)
 
 
 def check_czml(path: Path) -> list[Finding]:
-    """Findings about a CZML document."""
+    """Check a CZML document."""
     try:
         packets = _document(path)
     except ExportError as error:
@@ -161,31 +161,35 @@ def _packets(packets: Any, path: Path) -> Iterator[Finding]:
         return
     if packets[0].get("id") != "document" or packets[0].get("version") != "1.0":
         yield Finding("error", "DOCUMENT", 'the first packet needs id "document" and version "1.0"', name)
-    seen: set[str] = set()
+    known: set[str] = set()
     for index, packet in enumerate(packets[1:], 1):
         where = f"{name}: {packet.get('id', index)}"
-        if str(packet.get("id")) in seen:
-            # Legal: later packets add to earlier ones. Among figures it merges two into one.
+        if str(packet.get("id")) in known:
+            # Legal: later packets add to earlier ones. Here it would merge two figures.
             yield Finding("warning", "SAME_ID", "an earlier packet has the same id", where)
-        seen.add(str(packet.get("id")))
+        known.add(str(packet.get("id")))
         yield from _packet(packet, path, where)
 
 
 def _packet(packet: dict[str, Any], path: Path, where: str) -> Iterator[Finding]:
     check_shape(packet, {"position": dict, "orientation": dict}, where)
     position = packet.get("position", {}).get("cartographicDegrees")
-    if position is not None and not (isinstance(position, list) and numbers(position, len(position))):
-        yield Finding("error", "COORDINATES", "cartographicDegrees are no numbers", where)
+    if position is not None and not (isinstance(position, list) and is_number_list(position, len(position))):
+        yield Finding("error", "COORDINATES", "cartographicDegrees are not numbers", where)
         return
     fixed: list[float] = position if position is not None and len(position) == 3 else []
     if problems := list(_range(fixed, where)) if fixed else []:
         yield from problems
         return
-    turned = packet.get("orientation", {}).get("unitQuaternion")
-    if turned is not None and not isinstance(turned, list):
-        yield Finding("error", "ORIENTATION", "unitQuaternion is no list", where)
+    orientation = packet.get("orientation", {}).get("unitQuaternion")
+    if orientation is not None and not isinstance(orientation, list):
+        yield Finding("error", "ORIENTATION", "unitQuaternion is not a list", where)
         return
-    elif turned is not None and len(turned) == 4 and not (numbers(turned, 4) and _is_unit(turned)):
+    elif (
+        orientation is not None
+        and len(orientation) == 4
+        and not (is_number_list(orientation, 4) and _is_unit(orientation))
+    ):
         yield Finding("error", "ORIENTATION", "unitQuaternion is not of length 1", where)
         return
     model = packet.get("model")
@@ -193,7 +197,7 @@ def _packet(packet: dict[str, Any], path: Path, where: str) -> Iterator[Finding]
         return
     reference = model.get("heightReference", "NONE")
     if isinstance(reference, str) and reference not in HEIGHT_REFERENCES:
-        yield Finding("error", "HEIGHT_REFERENCE", f"{reference} is none that CesiumJS knows", where)
+        yield Finding("error", "HEIGHT_REFERENCE", f"{reference} is unknown to CesiumJS", where)
     uri = model.get("gltf")
     uri = uri.get("uri") if isinstance(uri, dict) else uri
     if not isinstance(uri, str):
@@ -203,17 +207,17 @@ def _packet(packet: dict[str, Any], path: Path, where: str) -> Iterator[Finding]
     yield from findings
     if place is None:
         return
-    if not fixed or turned is None or len(turned) != 4:
-        yield Finding("warning", "PLACE", "has no fixed position and orientation, its model has", where)
+    if not fixed or orientation is None or len(orientation) != 4:
+        yield Finding("warning", "PLACE", "no fixed position and orientation, unlike its model", where)
         return
     yield from _same_place(fixed, place, where)
     # Both signs of a quaternion are the same rotation.
-    cosine = abs(float(np.dot(turned, entity_quaternion(place))))
+    cosine = abs(float(np.dot(orientation, entity_quaternion(place))))
     if 2 * math.degrees(math.acos(min(cosine, 1.0))) > TURN_TOLERANCE_DEG:
-        yield Finding("error", "PLACE", "is turned otherwise than its model records", where)
+        yield Finding("error", "PLACE", "its orientation differs from that recorded in its model", where)
     if reference != height_reference(place):
         expected = height_reference(place)
-        yield Finding("error", "HEIGHT_REFERENCE", f"{reference}, but its model is placed with {expected}", where)
+        yield Finding("error", "HEIGHT_REFERENCE", f"{reference}, expected {expected} as for its model", where)
 
 
 def _is_unit(values: list[float]) -> bool:

@@ -1,4 +1,4 @@
-"""CZML: figures as CesiumJS entities, which can stand on terrain where tilesets cannot.
+"""CZML: figures as CesiumJS entities, which, unlike tilesets, can be clamped to terrain.
 
 https://github.com/AnalyticalGraphicsInc/czml-writer/wiki/CZML-Structure
 https://cesium.com/learn/cesiumjs/ref-doc/ModelGraphics.html
@@ -26,9 +26,9 @@ from georef.placement import GeoPlacement
 
 
 def packet(figure: PlacedFigure, identifier: str, model: str) -> dict[str, Any]:
-    """A figure as a packet.
+    """Return the packet of a figure.
 
-    identifier : unique in its document; model : path of its model as seen from the file
+    identifier : unique in its document; model : path of its model relative to the file
     """
     place = figure.placement
     return {
@@ -49,7 +49,7 @@ def packet(figure: PlacedFigure, identifier: str, model: str) -> dict[str, Any]:
 
 
 def height_reference(place: GeoPlacement) -> str:
-    """What CesiumJS is to measure the height from; RELATIVE_TO_GROUND where clamped feet are not on the ground."""
+    """Return the heightReference of CesiumJS; RELATIVE_TO_GROUND where clamped feet are not on the ground."""
     if place.altitude_mode == "absolute":
         return "NONE"
     return "RELATIVE_TO_GROUND" if place.height_m else "CLAMP_TO_GROUND"
@@ -58,16 +58,16 @@ def height_reference(place: GeoPlacement) -> str:
 def entity_quaternion(place: GeoPlacement) -> list[float]:
     """Unit quaternion (x, y, z, w) of a CesiumJS Entity in ECEF whose model's nose points to the heading.
 
-    CesiumJS turns a model's front, +Z of glTF, to the entity's +x, its +X to +y and its up to +z.
+    CesiumJS maps a model's front, +Z of glTF, to the entity's +x, its +X to +y and its up to +z.
     """
     left, back, up = ecef_matrix(place)[:3, :3].T
     return quaternion(np.stack([-back, left, up], axis=1))
 
 
 def quaternion(rotation: NDArray[np.float64]) -> list[float]:
-    """Unit quaternion (x, y, z, w) of a (3, 3) rotation, w or else the first of the others positive.
+    """Unit quaternion (x, y, z, w) of a (3, 3) rotation, w or else the first non-zero component positive.
 
-    Shepperd (1978): divides by the largest component, so no rotation loses digits.
+    Shepperd (1978): divides by the largest component, for numerical stability.
     """
     trace = float(np.trace(rotation))
     squares = [*(1 - trace + 2 * float(rotation[axis, axis]) for axis in range(3)), 1 + trace]
@@ -90,7 +90,7 @@ def quaternion(rotation: NDArray[np.float64]) -> list[float]:
 
 
 def description(figure: PlacedFigure) -> str:
-    """A table of what is known about a figure, HTML; all text in it is escaped."""
+    """Return an HTML table of the facts about a figure; all text in it is escaped."""
     place = figure.placement
     ground = "above the terrain" if place.altitude_mode == "clamp" else "above the ellipsoid"
     rows = {
@@ -107,9 +107,9 @@ def description(figure: PlacedFigure) -> str:
 
 
 def write_czml(asset: Asset, path: Path, profile: Profile = GENERAL) -> None:
-    """Write a placed asset as a CZML document, with its model as `<stem>.glb` beside it.
+    """Write a placed asset as a CZML document, with its model as `<stem>.glb` next to it.
 
-    profile : what the client of the model takes
+    profile : of the client of the model
 
     Raises ExportError for an asset without a placement or triangles.
     """
@@ -121,9 +121,9 @@ def write_czml(asset: Asset, path: Path, profile: Profile = GENERAL) -> None:
 
 
 def write_packets(figures: Iterable[PlacedFigure], stream: TextIO, name: str) -> None:
-    """Write a CZML document, a packet a line.
+    """Write a CZML document, one packet per line.
 
-    figures : `contents` as seen from the file, the finest of each is its model
+    figures : `contents` relative to the file; the finest of each is its model
     name : of the document
     """
     head = {"id": "document", "name": name, "version": "1.0"}

@@ -1,4 +1,4 @@
-"""GeoJSON: figures as points with attributes, for maps; the model is named beside.
+"""GeoJSON: figures as points with attributes, for maps; an attribute names the model.
 
 https://www.rfc-editor.org/rfc/rfc7946
 """
@@ -32,17 +32,17 @@ OWN_PROPERTIES: dict[str, type] = {
     "parts": str,
     "model": str,
 }
-"""What a feature says of its figure before the columns of the user's table, in order; any may be None."""
+"""Properties of a feature before the columns of the user's table, in order; any may be None."""
 
 
 def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
-    """A figure as a Feature with a Point; its properties are `OWN_PROPERTIES` and then the figure's attributes.
+    """Return a figure as a Feature with a Point; its properties are `OWN_PROPERTIES` and then the figure's attributes.
 
-    model : path of its model as seen from the file, None without one
+    model : path of its model relative to the file, None without one
 
-    The third coordinate is the height above the ellipsoid, as RFC 7946 has it. A figure that stands on whatever
-    terrain there is has no such height: its `height_m` is above the terrain, and its point has two coordinates.
-    An attribute whose name is taken gets another, see `free_names`.
+    The third coordinate is the height above the ellipsoid, as in RFC 7946. A figure that is clamped to the terrain has
+    no such height: its `height_m` is above the terrain, and its point has two coordinates.
+    Attributes with reserved names are renamed, see `free_names`.
     """
     place = figure.placement
     clamped = place.altitude_mode == "clamp"
@@ -56,7 +56,7 @@ def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
         "height_datum": place.height_datum,
         "altitude_mode": place.altitude_mode,
         "observed_share": figure.observed,
-        "parts": ", ".join(figure.parts) or None,  # text: GIS tables have no lists
+        "parts": ", ".join(figure.parts) or None,  # text, as GIS tables have no lists
         "model": quote(model) if model else None,
     }
     names = free_names(tuple(name for name, _ in figure.attributes), tuple(OWN_PROPERTIES))
@@ -65,18 +65,17 @@ def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
     return {
         "type": "Feature",
         "geometry": {"type": "Point", "coordinates": coordinates},
-        # Every feature has the same attributes: tables are made from the first one.
+        # Every feature has the same attributes: readers derive the table from the first one.
         "properties": properties,
     }
 
 
 @functools.lru_cache(maxsize=64)
 def free_names(names: tuple[str, ...], taken: tuple[str, ...]) -> tuple[str, ...]:
-    """The names of columns, those that are taken with `_2` at their end, or the first number that is free.
+    """Make column names unique by appending `_2`, or the first free number, to those already taken.
 
-    Capital and small letters count as the same, as tables of SQL have it: `Name` beside `name` becomes `Name_2`. A
-    name met twice is taken the second time; a column that needs no number keeps its name whatever comes before it. An
-    empty name becomes `column`.
+    Comparison ignores case, as in SQL: `Name` next to `name` becomes `Name_2`. The first of several equal names is
+    kept; a column that needs no number keeps its name in any case. An empty name becomes `column`.
     """
     used = {name.casefold() for name in taken}
     found = list(names)
@@ -94,9 +93,9 @@ def free_names(names: tuple[str, ...], taken: tuple[str, ...]) -> tuple[str, ...
 
 
 def write_geojson(asset: Asset, path: Path, profile: Profile = GENERAL) -> None:
-    """Write a placed asset as one Feature, with its model as `<stem>.glb` beside it.
+    """Write a placed asset as one Feature, with its model as `<stem>.glb` next to it.
 
-    profile : what the client of the model takes
+    profile : of the client of the model
 
     Raises ExportError for an asset without a placement or triangles.
     """
@@ -107,9 +106,9 @@ def write_geojson(asset: Asset, path: Path, profile: Profile = GENERAL) -> None:
 
 
 def write_collection(figures: Iterable[PlacedFigure], stream: TextIO, models: bool = True) -> None:
-    """Write a FeatureCollection, a feature a line.
+    """Write a FeatureCollection, one feature per line.
 
-    figures : `contents` as seen from the file; models : whether to name the finest of them
+    figures : `contents` relative to the file; models : whether to name the finest of them
     """
     stream.write('{"type":"FeatureCollection","features":[')
     for number, figure in enumerate(figures):

@@ -26,12 +26,12 @@ FIGURES_LAYER, FAILED_TABLE = "figures", "failed"
 
 FAILED_COLUMNS: dict[str, type] = {"row": int, "name": str, "error": str}
 
-OUR_OPTIONS = {"OGR_CURRENT_DATE": "1970-01-01T00:00:00.000Z", "OGR_SQLITE_SYNCHRONOUS": "OFF"}
-"""GDAL's settings while we write: no time of the day, so that the same figures give the same bytes; and no waiting
-for the disk after every chunk, as a file that was broken off is thrown away anyhow."""
+GDAL_OPTIONS = {"OGR_CURRENT_DATE": "1970-01-01T00:00:00.000Z", "OGR_SQLITE_SYNCHRONOUS": "OFF"}
+"""GDAL's settings for writing: a fixed date, so that the same figures give the same bytes; and no synchronous writes,
+as an incomplete file is discarded anyway."""
 
 Failure = tuple[int, str, str]
-"""Row of the table, name of the figure, what went wrong."""
+"""Row of the table, name of the figure, error message."""
 
 
 def write_geopackage(
@@ -41,22 +41,22 @@ def write_geopackage(
     models: bool = True,
     failed: Iterable[Failure] | None = None,
 ) -> int:
-    """Write the layer `figures`, a point each in their order, with the attributes of `exporters.gis.geojson.feature`.
+    """Write the layer `figures`, one point each in order, with the attributes of `exporters.gis.geojson.feature`.
 
-    figures : `contents` as seen from the file; read once, in chunks, so they may be more than memory holds
-    path : replaced if it is there; its folder takes a temporary file as large as the result
+    figures : `contents` relative to the file; read once, in chunks, so they may exceed memory
+    path : replaced if it exists; its folder needs space for a temporary file as large as the result
     models : whether to name the finest of the contents
-    failed : if given, makes the table `failed`, without geometry, its columns `row`, `name` and `error`
+    failed : if given, also write the table `failed`, without geometry, with columns `row`, `name` and `error`
 
     Returns the number of figures. Their ids (`fid`) are 1, 2, 3, ...
 
-    Coordinates are longitude, latitude and height above the ellipsoid, EPSG:4979. A figure that stands on whatever
-    terrain there is has a point of two coordinates, as in GeoJSON; a layer of nothing but such is of EPSG:4326.
-    Columns are yes or no, whole numbers, numbers or text, whatever holds all their values exactly, see
-    `exporters.gis.table_spool.TableSpool`. Text is written as it is, also where it begins with =, +, - or @: a database
-    computes nothing. Take care when it is exported to a spreadsheet.
+    Coordinates are longitude, latitude and height above the ellipsoid, EPSG:4979. A figure that is clamped to the
+    terrain has a point of two coordinates, as in GeoJSON; a layer of only such points is in EPSG:4326.
+    Columns are booleans, integers, floats or text, the narrowest type that holds all their values exactly, see
+    `exporters.gis.table_spool.TableSpool`. Text is written unchanged, also if it begins with =, +, - or @: a database
+    does not evaluate formulas. Take care when exporting it to a spreadsheet.
 
-    Raises ExportError where the disk refuses.
+    Raises ExportError where the file cannot be written.
     """
     from pyogrio.errors import DataLayerError, DataSourceError
 
@@ -70,7 +70,7 @@ def write_geopackage(
                 table.add(_point_wkb(point), document["properties"])
             _write_table(target, FIGURES_LAYER, table, 3 if heights or not table.rows else 2)
             if 0 < heights < table.rows:
-                _some_have_heights(target)
+                _declare_optional_heights(target)
             if failed is not None:
                 with TableSpool(path.parent, FAILED_COLUMNS) as failures:
                     for row in failed:
@@ -78,12 +78,12 @@ def write_geopackage(
                     _write_table(target, FAILED_TABLE, failures, 0)
             return table.rows
     except (OSError, sqlite3.Error, DataLayerError, DataSourceError) as error:
-        found = f"cannot be written ({' '.join(str(error).split())[:200]})"
-        raise ExportError(path, found, "check the folder and the space on its disk") from error
+        finding = f"cannot be written ({' '.join(str(error).split())[:200]})"
+        raise ExportError(path, finding, "check the folder and the disk space") from error
 
 
 def _write_table(path: Path, layer: str, table: TableSpool, dimensions: int) -> None:
-    """Append all rows of a table as a new layer, its points of so many coordinates, 0 without a geometry."""
+    """Append all rows of a table as a new layer; dimensions : of its points, 0 without a geometry."""
     import pyogrio.raw
 
     columns = table.columns
@@ -106,22 +106,22 @@ def _write_table(path: Path, layer: str, table: TableSpool, dimensions: int) -> 
 
 
 def _point_wkb(coordinates: list[float]) -> bytes:
-    """A point as ISO well-known binary, little endian; with a height its type is 1001."""
+    """Encode a point as ISO well-known binary, little endian; its type is 1001 with a height."""
     kind = {2: 1, 3: 1001}[len(coordinates)]
     return struct.pack(f"<BI{len(coordinates)}d", 1, kind, *coordinates)
 
 
-def _some_have_heights(path: Path) -> None:
-    """Say that heights are optional, z = 2; GDAL can only say that all points have one or none has."""
+def _declare_optional_heights(path: Path) -> None:
+    """Declare heights as optional, z = 2; GDAL can only declare that all points have one or none has."""
     with closing(sqlite3.connect(path)) as database, database:
         database.execute("UPDATE gpkg_geometry_columns SET z = 2 WHERE table_name = ?", (FIGURES_LAYER,))
 
 
 @contextmanager
 def _for_gdal(path: Path) -> Iterator[Path]:
-    """A path for pyogrio that is free, its file moved to `path` at the end, and gone where something fails.
+    """Give pyogrio an unused path, whose file is moved to `path` at the end, or removed on failure.
 
-    What pyogrio takes for an archive, as it does everything with a `!`, is written elsewhere first.
+    Paths that pyogrio takes for archives, such as any with a `!`, are written elsewhere first.
     """
     from pyogrio.util import vsi_path
 
@@ -143,8 +143,8 @@ def _for_gdal(path: Path) -> Iterator[Path]:
 def _settings() -> Iterator[None]:
     from pyogrio import get_gdal_config_option, set_gdal_config_options
 
-    before = {name: get_gdal_config_option(name) for name in OUR_OPTIONS}
-    set_gdal_config_options(OUR_OPTIONS)
+    before = {name: get_gdal_config_option(name) for name in GDAL_OPTIONS}
+    set_gdal_config_options(GDAL_OPTIONS)
     try:
         yield
     finally:

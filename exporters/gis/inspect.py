@@ -1,4 +1,4 @@
-"""What is in CZML and GeoJSON."""
+"""Facts about CZML and GeoJSON files."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from urllib.parse import unquote
 
 from exporters.errors import ExportError
 from exporters.gltf.inspect import gltf_facts
-from georef.untrusted.json_file import is_there, read_json
-from georef.untrusted.json_shape import Needed, Nullable, check_shape
+from georef.untrusted.json_file import is_plain_file, read_json
+from georef.untrusted.json_shape import Nullable, Required, check_shape
 
 FORMATS = {".czml": "CZML", ".geojson": "GeoJSON"}
 
 _FEATURE = {"properties": Nullable(dict)}
 
-FEATURES = _FEATURE | {"type": Needed(str), "features": [_FEATURE]}
-"""What is taken for granted of GeoJSON."""
+FEATURES = _FEATURE | {"type": Required(str), "features": [_FEATURE]}
+"""Shape of the used members of GeoJSON."""
 
 
 def models_of(path: Path) -> tuple[int, list[Path]]:
-    """How many figures a CZML or GeoJSON file has, and the model files beside it that they name.
+    """Return the number of figures of a CZML or GeoJSON file, and the local model files that they name.
 
-    Raises ExportError for what is no JSON, DamagedFile for what is neither.
+    Raises ExportError for files that are not JSON, DamagedFile for other JSON.
     """
     document = read_json(path, "write it again", ExportError)
     if path.suffix.lower() == ".czml":
@@ -37,10 +37,10 @@ def models_of(path: Path) -> tuple[int, list[Path]]:
 
 
 def places_facts(path: Path) -> dict[str, Any]:
-    """Facts about a CZML or GeoJSON file: those of its model where it has one only, else the number of figures."""
+    """Return facts about a CZML or GeoJSON file: those of its model if it has only one, else the number of figures."""
     count, models = models_of(path)
     own = {"format": FORMATS[path.suffix.lower()], "files": {path.name: path.stat().st_size}}
-    if count != 1 or not models or not is_there(models[0]):
+    if count != 1 or not models or not is_plain_file(models[0]):
         return own | {"metadata": {"figures": count}}
     facts = gltf_facts(models[0])
     return facts | own | {"files": own["files"] | facts["files"]}

@@ -1,4 +1,4 @@
-"""STAC: a static catalogue of figures, a collection with an item beside the files of each, for archives.
+"""STAC: a static catalogue of figures for archives, a collection with one item per figure next to its files.
 
 https://github.com/radiantearth/stac-spec/tree/v1.1.0
 https://github.com/stac-extensions/file
@@ -36,20 +36,20 @@ RESERVED = (
     "title", "unit", "updated",
 )
 # fmt: on
-"""Properties to which STAC's common metadata gives a meaning and a form that a user's column need not have."""
+"""Properties with a defined meaning and format in STAC's common metadata, which a user's column may not follow."""
 
 SHA2_256 = "1220"
-"""Head of a multihash: function 0x12, digest of 0x20 bytes; https://github.com/multiformats/multicodec."""
+"""Prefix of a multihash: function 0x12, digest of 0x20 bytes; https://github.com/multiformats/multicodec."""
 
 
 @dataclass(frozen=True, slots=True)
 class StacFile:
     """A file of a catalogue.
 
-    path : seen from the folder of the collection, with slashes
+    path : relative to the folder of the collection, with slashes
     size : bytes
     sha256 : hexadecimal digest
-    roles : what it is for; without any, by the end of its name, see `exporters.media_types`
+    roles : of the asset; if empty, by the suffix, see `exporters.media_types`
     """
 
     path: str
@@ -62,10 +62,10 @@ class StacFile:
 class StacItem:
     """A figure of a catalogue.
 
-    figure : its place and what is said of it
+    figure : its record with place and attributes
     id : unique, and the name of its folder in that of the collection
-    files : everything that was made of it
-    datetime : when it was drawn or its picture made, see `exporters.gis.time_span.time_span`
+    files : all files of the figure
+    datetime : date of the drawing or of its picture, see `exporters.gis.time_span.time_span`
     """
 
     figure: PlacedFigure
@@ -75,30 +75,30 @@ class StacItem:
 
     def __post_init__(self) -> None:
         if self.id in ("", ".", "..") or re.search(r"[/\\]", self.id):
-            raise ValueError(f"{self.id!r} is no name of a folder")
+            raise ValueError(f"{self.id!r} is not a folder name")
 
     @property
     def path(self) -> str:
-        """Of the item's own file, seen from the folder of the collection."""
+        """Path of the item's own file, relative to the folder of the collection."""
         return f"{self.id}/{self.id}{ITEM_SUFFIX}"
 
 
 def stac_file(folder: Path, path: str, roles: tuple[str, ...] = ()) -> StacFile:
-    """The record of a file that is there; its bytes are read once. Arguments as in `StacFile`."""
+    """Return the record of an existing file; its bytes are read once. Arguments as in `StacFile`."""
     file = folder / path
     return StacFile(path, file.stat().st_size, sha256_of(file), roles)
 
 
 def item_document(item: StacItem, collection: str) -> dict[str, Any]:
-    """A figure as a STAC item: a Point, attributes, and every file as an asset.
+    """Return a figure as a STAC item: a Point, attributes, and every file as an asset.
 
     collection : id of the collection that it belongs to
 
-    Properties are those of `exporters.gis.geojson.feature` without the model, which is an asset, and without what is
-    unknown. A column of the user's table with a name that STAC gives a meaning to gets another, as `title_2`. A date
-    that is no moment becomes `start_datetime` and `end_datetime`, and `datetime` null.
+    Properties are those of `exporters.gis.geojson.feature` without the model, which is an asset, and without unknown
+    values. A column of the user's table with a name that is reserved in STAC is renamed, as `title_2`. A period of time
+    becomes `start_datetime` and `end_datetime`, and `datetime` null.
 
-    Raises ExportError, naming the item, for a date that is none.
+    Raises ExportError, naming the item, for an invalid date.
     """
     found = feature(item.figure, None)
     point = found["geometry"]["coordinates"]
@@ -145,22 +145,22 @@ def write_stac(
 ) -> int:
     """Write `collection.json`, and for each figure `<id>/<id>.stac.json`, into a folder; returns the number of items.
 
-    items : read once, so they may be more than memory holds; the collection links to them in their order
-    folder : where the paths of files are seen from; folders of items are made if they are not there
+    items : read once, so they may exceed memory; the collection links to them in order
+    folder : base of the paths of files; folders of items are created if missing
     id, title, description, keywords : of the collection
     license : SPDX identifier, or "other" with `license_link`, address of its text
     files : of the collection as a whole, such as `tileset.json` and `index.gpkg`
 
-    Files of the same names are replaced, each whole or not at all. The same figures give the same bytes. References
-    are relative, so the folder may be moved and served as it is. They are IRIs, as STAC has it: letters of all scripts
-    stand as they are, other characters are percent-encoded. `fig2mesh` gives names without such characters, because
-    PySTAC takes references between files on a disk for plain paths.
+    Files of the same names are replaced, each atomically. The same figures give the same bytes. References are
+    relative, so the folder may be moved and served unchanged. They are IRIs, as in STAC: letters of all scripts remain,
+    other characters are percent-encoded. `fig2mesh` uses names without such characters, because PySTAC takes
+    references between local files for plain paths.
 
-    Raises ExportError for a date that is none, ValueError for a license that is no identifier, and OSError where the
-    disk refuses.
+    Raises ExportError for an invalid date, ValueError for a license that is not an identifier, and OSError where a
+    file cannot be written.
     """
     if not re.fullmatch(r"[\w.+-]+", license):
-        raise ValueError(f"license {license!r} is no identifier")
+        raise ValueError(f"license {license!r} is not an identifier")
     head = {
         "type": "Collection",
         "stac_version": STAC_VERSION,
@@ -190,9 +190,9 @@ def write_stac(
 
 
 def _assets(files: Iterable[StacFile], folder: str, stem: str) -> dict[str, dict[str, Any]]:
-    """Assets by the ends of their names, as `glb` and `lod1.glb`, which are the same for all figures.
+    """Return assets by the endings of their names, such as `glb` and `lod1.glb`, which are the same for all figures.
 
-    folder : of the document, seen from the collection's; stem : what names of files usually begin with
+    folder : of the document, relative to that of the collection; stem : usual beginning of the file names
     """
     assets: dict[str, dict[str, Any]] = {}
     for file in files:
@@ -213,7 +213,7 @@ def _assets(files: Iterable[StacFile], folder: str, stem: str) -> dict[str, dict
 
 
 def _href(path: str, folder: str) -> str:
-    """A path as an IRI reference from a folder, both seen from the collection's; it begins with ./ or ../"""
+    """Return a path as an IRI reference from a folder, both relative to the collection's; it begins with ./ or ../"""
     relative = posixpath.relpath(path, folder or ".")
     text = re.sub(r"[\x00-\x7f]+", lambda match: quote(match[0]), relative)
     return text if text.startswith("../") else f"./{text}"

@@ -1,4 +1,4 @@
-"""Where and when a collection of figures is, gathered one figure at a time in constant memory."""
+"""Spatial and temporal extent of a collection of figures, accumulated one figure at a time in constant memory."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 from exporters.gis.time_span import TimeSpan, stamp
 
 BINS = 3600
-"""Of longitude, a tenth of a degree each."""
+"""Number of longitude bins, a tenth of a degree each."""
 
 
 class Longitudes:
-    """The shortest stretch of the parallel that holds all longitudes; it may cross the antimeridian.
+    """Shortest interval that contains all longitudes; it may cross the antimeridian.
 
-    Kept are the lowest and the highest longitude in each bin, so the ends are exact; a gap shorter than a bin counts
-    as none.
+    The lowest and highest longitude of each bin are stored, so the ends are exact; gaps shorter than a bin are
+    ignored.
     """
 
     def __init__(self) -> None:
@@ -24,13 +24,13 @@ class Longitudes:
         self._highest = [-math.inf] * BINS
 
     def add(self, lon_deg: float) -> None:
-        """lon_deg : in [-180, 180]"""
-        place = min(int((lon_deg + 180.0) * (BINS / 360.0)), BINS - 1)
-        self._lowest[place] = min(self._lowest[place], lon_deg)
-        self._highest[place] = max(self._highest[place], lon_deg)
+        """Add a longitude; lon_deg : in [-180, 180]."""
+        index = min(int((lon_deg + 180.0) * (BINS / 360.0)), BINS - 1)
+        self._lowest[index] = min(self._lowest[index], lon_deg)
+        self._highest[index] = max(self._highest[index], lon_deg)
 
     def ends(self) -> tuple[float, float]:
-        """West and east end, degrees; west is above east where the stretch crosses the antimeridian (RFC 7946, 5.2).
+        """West and east end, degrees; west is greater than east across the antimeridian (RFC 7946, 5.2).
 
         Raises ValueError without any longitude.
         """
@@ -46,7 +46,7 @@ class Longitudes:
 
 
 class Extent:
-    """The extent of a STAC collection."""
+    """Extent of a STAC collection."""
 
     def __init__(self) -> None:
         self._longitudes = Longitudes()
@@ -57,7 +57,7 @@ class Extent:
         self.count = 0
 
     def add(self, coordinates: list[float], span: TimeSpan) -> None:
-        """coordinates : longitude, latitude, degrees, and the height, metres, where there is one"""
+        """Add a figure; coordinates : longitude, latitude, degrees, and optionally the height, metres."""
         lon, lat, *height = coordinates
         self._longitudes.add(lon)
         self._latitudes = _widened(self._latitudes, lat)
@@ -69,9 +69,9 @@ class Extent:
         self.count += 1
 
     def document(self) -> dict[str, Any]:
-        """The extent object; of no figures, the whole earth and any time.
+        """Return the extent object; without figures, the whole earth and any time.
 
-        The box has heights where every figure has one.
+        The bounding box has heights if every figure has one.
         """
         if self._span is None:
             box: list[float] = [-180.0, -90.0, 180.0, 90.0]

@@ -1,4 +1,4 @@
-"""Rows of a table whose columns are known only when the last row has been seen; memory holds a chunk of them."""
+"""Spool for rows of a table whose columns are known only after the last row; memory holds one chunk of rows."""
 
 from __future__ import annotations
 
@@ -16,35 +16,33 @@ from numpy.typing import NDArray
 from exporters.placed_figure import Value
 
 CHUNK_ROWS = 4096
-"""Rows in memory at a time; at about 1 kB each they stay below 10 MB, and a database commits once a chunk."""
+"""Rows in memory at a time, below 10 MB at about 1 kB each; a database commits once per chunk."""
 
 IN_MEMORY_BYTES = 1 << 22
-"""Up to this size chunks are kept in memory; beyond it they go to the disk."""
+"""Size up to which chunks are kept in memory; larger ones are written to disk."""
 
 KINDS: tuple[type, ...] = (bool, int, float, str)
-"""Kinds of columns; each can hold the values of those before it."""
+"""Column types, narrowest first; each can hold the values of those before it."""
 
 Rows = list[tuple[Any, dict[str, Value]]]
 
 
 class TableSpool:
-    """Rows in order, kept in chunks on the disk, and what the columns of all of them are.
+    """Rows in order, stored in chunks on disk, and the columns of all of them.
 
-    columns : name → kind, in the order in which names are met; the least kind that holds every value exactly. A
-        column that holds numbers and text is text, one of nothing but None too. So is one of floats and a whole number
-        that float64 would round, as 2^53 + 1; without floats it is one of whole numbers, whatever gaps it has. Beside
-        numbers yes and no are 1 and 0. Names that differ only in capital and small letters are one column, as in SQL;
-        the first spelling counts
+    columns : name → type, in the order of first occurrence; the narrowest type that holds every value exactly. A
+        column of numbers and text is text, and so is one of only None. So is one of floats and an integer that float64
+        would round, as 2^53 + 1; without floats it is a column of integers, even with missing values. Among numbers,
+        booleans are 1 and 0. Names that differ only in case are one column, as in SQL; the first spelling is used
     """
 
     def __init__(self, folder: Path, columns: Mapping[str, type] | None = None) -> None:
-        """folder : where the temporary file goes; columns : those that are there even without rows, with a kind that
-        does not change."""
+        """folder : of the temporary file; columns : columns with a fixed type, present even without rows."""
         self.rows = 0
         self._kinds: dict[str, int] = {name: KINDS.index(kind) for name, kind in (columns or {}).items()}
         self._fixed = frozenset(self._kinds)
         self._rounded: set[str] = set()
-        """Columns with a whole number that float64 does not hold; Python compares the two without rounding."""
+        """Columns with an integer that float64 cannot represent; Python compares the two without rounding."""
         self._columns: dict[str, str] = {}
         self._spellings = {name.casefold(): name for name in self._kinds}
         self._chunk: Rows = []
@@ -69,7 +67,7 @@ class TableSpool:
         return KINDS[kind]
 
     def add(self, key: Any, values: Mapping[str, Value]) -> None:
-        """Append a row; key : whatever belongs to it beside the columns, such as its geometry."""
+        """Append a row; key : data of the row besides the columns, such as its geometry."""
         row: dict[str, Value] = {}
         for name, value in values.items():
             column = self._columns.get(name)
@@ -86,7 +84,7 @@ class TableSpool:
             self._flush()
 
     def chunks(self) -> Iterator[Rows]:
-        """The rows in order, some at a time; once all of them are added."""
+        """Iterate over the rows in order, in chunks, after all of them are added."""
         self._flush()
         end = self._file.tell()
         self._file.seek(0)
@@ -100,15 +98,15 @@ class TableSpool:
 
 
 def _kind(value: Value) -> int:
-    """Index in KINDS of the least kind of column that holds a value; -1 for None, which any holds."""
+    """Index in KINDS of the narrowest type that holds a value; -1 for None, which any holds."""
     return -1 if value is None else KINDS.index(type(value))
 
 
 def column_arrays(values: list[Value], kind: type) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    """Values of a column as an array, (N,) bool, int64, float64 or object of str, and where they are None.
+    """Convert a column to an array, (N,) bool, int64, float64 or object of str, and a mask of its None values.
 
-    The mask is None for text, which has its None in the array itself, and for a column without None. Numbers in a
-    column of text are as JSON writes them, which loses no digit.
+    The mask is None for text, where the array itself contains None, and for a column without None. Numbers in a column
+    of text are formatted as in JSON, without loss of digits.
     """
     if kind is str:
         text = [value if value is None or isinstance(value, str) else json.dumps(value) for value in values]

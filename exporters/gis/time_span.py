@@ -1,4 +1,4 @@
-"""Dates as people write them, as spans of time: a year is as long as a year.
+"""ISO 8601 dates as spans of time, such as a whole year.
 
 https://www.rfc-editor.org/rfc/rfc3339
 """
@@ -13,34 +13,34 @@ from datetime import UTC, datetime
 from exporters.errors import ExportError
 
 _DAY = re.compile(r"(\d{4})(?:-(\d\d)(?:-(\d\d))?)?", re.ASCII)
-_MOMENT = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d(\.\d+)?)?([Zz]|[+-]\d\d:?\d\d)?", re.ASCII)
+_INSTANT = re.compile(r"\d{4}-\d\d-\d\d[Tt ]\d\d:\d\d(:\d\d(\.\d+)?)?([Zz]|[+-]\d\d:?\d\d)?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
 class TimeSpan:
-    """From the first to the last moment, both in UTC; the same one for a moment."""
+    """Span from the first to the last instant, both in UTC; equal for a single instant."""
 
     start: datetime
     end: datetime
 
 
 def time_span(text: str, source: str = "date") -> TimeSpan:
-    """The span of time that an ISO 8601 date means.
+    """Parse the span of time of an ISO 8601 date.
 
-    text : a year, "1893", a month, "1893-05", a day, "1893-05-17", a moment, "1893-05-17T12:00:00Z" (without an offset
-        it is UTC), or from the first moment of one to the last of another, "1893/1895"
-    source : where it comes from, for the error message
+    text : a year, "1893", a month, "1893-05", a day, "1893-05-17", an instant, "1893-05-17T12:00:00Z" (UTC without an
+        offset), or the interval from the start of one to the end of another, "1893/1895"
+    source : origin of the text, for the error message
 
     A year, month or day ends one second before the next.
 
-    Raises ExportError for anything else, as "around 1893", and for an end before its start.
+    Raises ExportError for anything else, such as "around 1893", and for an end before its start.
     """
     try:
         spans = [_span(part.strip()) for part in text.split("/", 1)]
         found = TimeSpan(spans[0].start, spans[-1].end)
     except (ValueError, OverflowError) as error:
-        remedy = "give a date such as 1893, 1893-05-17 or 1893/1895, or a moment such as 2024-05-17T12:00:00Z"
-        raise ExportError(source, f"{text!r} is no date of ISO 8601", remedy) from error
+        remedy = "give a date such as 1893, 1893-05-17 or 1893/1895, or an instant such as 2024-05-17T12:00:00Z"
+        raise ExportError(source, f"{text!r} is not an ISO 8601 date", remedy) from error
     if found.end < found.start:
         raise ExportError(source, f"{text!r} ends before it starts", "give the earlier date first")
     return found
@@ -53,13 +53,13 @@ def _span(text: str) -> TimeSpan:
         last_day = day or monthrange(year, last_month)[1]
         end = datetime(year, last_month, last_day, 23, 59, 59, tzinfo=UTC)
         return TimeSpan(datetime(year, month or 1, day or 1, tzinfo=UTC), end)
-    if not _MOMENT.fullmatch(text):
+    if not _INSTANT.fullmatch(text):
         raise ValueError(text)
-    moment = datetime.fromisoformat(text.upper())
-    moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
-    return TimeSpan(moment, moment)
+    instant = datetime.fromisoformat(text.upper())
+    instant = instant.replace(tzinfo=UTC) if instant.tzinfo is None else instant.astimezone(UTC)
+    return TimeSpan(instant, instant)
 
 
-def stamp(moment: datetime) -> str:
-    """A moment in UTC as RFC 3339 has it, with a Z."""
-    return moment.isoformat().replace("+00:00", "Z")
+def stamp(instant: datetime) -> str:
+    """Format an instant in UTC as in RFC 3339, with a Z."""
+    return instant.isoformat().replace("+00:00", "Z")

@@ -1,7 +1,7 @@
-"""Checks of glTF files: structure and our own promises in Python, the full rules by the Khronos validator.
+"""Checks of glTF files: structure and the guarantees of fig2mesh in Python, all other rules by the Khronos validator.
 
-Files from elsewhere promise less: what glTF does not demand of them (a closed solid, textures that do not repeat) is
-worth an info, not an error.
+Foreign files guarantee less: properties that glTF does not require (a closed solid, textures that do not repeat) are
+reported as infos, not errors.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
@@ -19,22 +19,22 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, as_infos, check_place, check_solid
 from exporters.gltf.khronos import khronos_findings
 from exporters.gltf.ktx2 import size_of
-from exporters.gltf.reader import Gltf, NotReadHere, read_gltf
+from exporters.gltf.reader import Gltf, NotDecoded, read_gltf
 from exporters.gltf.shape import MESHOPT
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.image_file import MAX_TEXTURE_PX, TooLarge, check_texture
 
 UNIT_TOLERANCE = 5e-4
-"""How far a normal's length may be from 1; the Khronos validator allows about as much."""
+"""Tolerance of the length of normals, about that of the Khronos validator."""
 
 BYTE_UNIT_TOLERANCE = 2e-2
-"""The same for normals of 8 bits: half a step of each of three components."""
+"""Tolerance of the length of 8-bit normals: half a step of each of three components."""
 
-NOT_HERE = "NOT_READ_HERE"
-"""Code of the infos about what is not decoded here."""
+NOT_DECODED = "NOT_READ_HERE"
+"""Code of the infos about data that is not decoded."""
 
 MAX_TEXTURES = 4
-"""Textures of the largest size whose pixels one file may have decoded: images may name the same bytes."""
+"""Limit of decoded pixels per file, in textures of the largest size: many images may refer to the same bytes."""
 
 # fmt: off
 CODECS = {
@@ -42,30 +42,30 @@ CODECS = {
     "EXT_texture_webp", "EXT_texture_avif",
 }
 # fmt: on
-"""Extensions that a file has to require, as its data cannot be read without them; common clients know them."""
+"""Extensions that files have to require, as their data cannot be read without them; common clients support them."""
 
 
 def check_gltf(path: Path, external: bool = True) -> list[Finding]:
-    """Findings about a .glb or .gltf file.
+    """Check a .glb or .gltf file.
 
-    external : run the Khronos validator too where it is found, see `exporters.gltf.khronos`
+    external : also run the Khronos validator if it is installed, see `exporters.gltf.khronos`
     """
     try:
         gltf = read_gltf(path)
     except ExportError as error:
         return [Finding("error", "UNREADABLE", error.finding, path.name)]
-    ours = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
-    findings = list(_check_document(gltf, ours))
+    own = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
+    findings = list(_check_document(gltf, own))
     for index, mesh in enumerate(gltf.items("meshes")):
         where = f"{path.name}: meshes/{index}"
         try:
             for number, primitive in enumerate(mesh["primitives"]):
-                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", ours)
+                findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", own)
             findings += _check_manifold(gltf, index, where)
             solid = check_solid(*gltf.solid_arrays(index), where)
-            findings += solid if ours or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
-        except NotReadHere as reason:
-            findings.append(Finding("info", NOT_HERE, str(reason), where))
+            findings += solid if own or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
+        except NotDecoded as reason:
+            findings.append(Finding("info", NOT_DECODED, str(reason), where))
         except DamagedFile as error:
             findings.append(Finding("error", "UNREADABLE_MESH", str(error), where))
     if not external:
@@ -75,28 +75,30 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
     return findings + khronos_findings(path, ktx2)
 
 
-def _check_document(gltf: Gltf, ours: bool) -> Iterator[Finding]:
+def _check_document(gltf: Gltf, own: bool) -> Iterator[Finding]:
     name = gltf.path.name
     about = gltf.document.get("asset", {})
     if about.get("version") != "2.0":
         yield Finding("error", "VERSION", f"asset.version is {about.get('version')}, expected 2.0", f"{name}: asset")
     if not gltf.items("meshes"):
-        yield Finding("error" if ours else "info", "NO_MESH", "no mesh", name)
+        yield Finding("error" if own else "info", "NO_MESH", "no mesh", name)
     used = gltf.document.get("extensionsUsed", [])
     for extension in gltf.document.get("extensionsRequired", []):
-        message = f"{extension}: viewers without it refuse the file"
+        message = f"{extension}: viewers without it reject the file"
         yield Finding("info" if extension in CODECS else "warning", "EXTENSION_REQUIRED", message, name)
         if extension not in used:
-            yield Finding("error", "EXTENSION_USED", f"{extension} is required but not among those used", name)
+            yield Finding("error", "EXTENSION_USED", f"{extension} is required but not in extensionsUsed", name)
     place = gltf.extras.get("georeference")
-    if ours and place is not None:
+    if own and place is not None:
         yield from check_place(place, f"{name}: asset.extras.georeference")
     for index in range(len(gltf.items("accessors"))):
         yield from _check_accessor(gltf, index, f"{name}: accessors/{index}")
     pixels = 0
     for index in range(len(gltf.items("images"))):
         if pixels > MAX_TEXTURES * MAX_TEXTURE_PX:
-            yield Finding("info", NOT_HERE, f"images/{index} and all after it: more pixels than are looked into", name)
+            yield Finding(
+                "info", NOT_DECODED, f"images/{index} and all later ones are not checked: too many pixels", name
+            )
             break
         pixels += yield from _check_image(gltf, index, f"{name}: images/{index}")
     yield from _check_property_tables(gltf)
@@ -107,8 +109,8 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
     accessor = gltf.items("accessors")[index]
     try:
         values = gltf.accessor(index)
-    except NotReadHere as reason:
-        yield Finding("info", NOT_HERE, str(reason), where)
+    except NotDecoded as reason:
+        yield Finding("info", NOT_DECODED, str(reason), where)
         return
     except DamagedFile as error:
         yield Finding("error", "ACCESSOR", str(error), where)
@@ -117,40 +119,40 @@ def _check_accessor(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:
         yield Finding("error", "NOT_FINITE", "NaN or infinite values", where)
         return
     if "bufferView" not in accessor and "sparse" not in accessor:
-        return  # zeros, or in the hands of an extension
+        return  # zeros, or defined by an extension
     for key, measured in (("min", values.min(axis=0)), ("max", values.max(axis=0))):
         if key in accessor and not np.array_equal(_stored(accessor[key], values.dtype), np.atleast_1d(measured)):
-            yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, values say {measured.tolist()}", where)
+            yield Finding("error", "MIN_MAX", f"{key} is {accessor[key]}, expected {measured.tolist()}", where)
 
 
 def _stored(numbers: list[float], dtype: np.dtype[Any]) -> NDArray[np.float64]:
-    """Numbers of the document as the buffers hold them: rounded where those have floats."""
+    """Convert numbers of the document to the precision of the buffers."""
     wide = np.array(numbers, np.float64)
     with np.errstate(over="ignore"):
         return wide.astype(dtype).astype(np.float64) if dtype.kind == "f" else wide
 
 
 def _check_image(gltf: Gltf, index: int, where: str) -> Generator[Finding, None, int]:
-    """Findings about an image; returns how many pixels had to be decoded."""
+    """Check an image; returns the number of decoded pixels."""
     try:
         data = gltf.image(index)
         if gltf.items("images")[index].get("mimeType") == "image/ktx2":
             size_of(data)
             return 0
         return check_texture(data)
-    except (NotReadHere, TooLarge) as reason:
-        yield Finding("info", NOT_HERE, str(reason), where)
+    except (NotDecoded, TooLarge) as reason:
+        yield Finding("info", NOT_DECODED, str(reason), where)
     except DamagedFile as error:
         yield Finding("error", "IMAGE", str(error), where)
     return 0
 
 
-def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bool) -> Iterator[Finding]:
+def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, own: bool) -> Iterator[Finding]:
     attributes = primitive["attributes"]
     if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-        raise NotReadHere("compressed with Draco")
+        raise NotDecoded("compressed with Draco")
     if "POSITION" not in attributes:
-        yield Finding("error" if ours else "info", "NO_POSITION", "no positions: nothing is drawn", where)
+        yield Finding("error" if own else "info", "NO_POSITION", "no positions: nothing is rendered", where)
         return
     count = len(gltf.accessor(attributes["POSITION"]))
     if "min" not in gltf.item("accessors", attributes["POSITION"]):
@@ -164,16 +166,16 @@ def _check_primitive(gltf: Gltf, primitive: dict[str, Any], where: str, ours: bo
     if mode == 4 and len(indices) % 3:
         yield Finding("error", "NOT_TRIANGLES", f"mode {mode}, {len(indices)} indices", where)
     elif mode != 4:
-        yield Finding("error" if ours else "info", "NOT_TRIANGLES", f"mode {mode}: no list of triangles", where)
+        yield Finding("error" if own else "info", "NOT_TRIANGLES", f"mode {mode}: not a list of triangles", where)
     if indices.max() >= count:
-        # Everything after this would read beyond the vertices.
+        # The checks below would read beyond the vertices.
         raise DamagedFile(f"index {int(indices.max())} of {count} vertices")
     if "NORMAL" in attributes:
         length = np.linalg.norm(gltf.vectors(attributes["NORMAL"], 3).astype(np.float64), axis=1)
         worst = float(np.abs(length - 1).max())
         if worst > (BYTE_UNIT_TOLERANCE if gltf.accessor(attributes["NORMAL"]).itemsize == 1 else UNIT_TOLERANCE):
             yield Finding("error", "NORMAL_LENGTH", f"normals are up to {worst:.2g} off unit length", where)
-    if "TEXCOORD_0" in attributes and ours:
+    if "TEXCOORD_0" in attributes and own:
         uv = gltf.numbers(attributes["TEXCOORD_0"])
         if uv.dtype.kind == "f" and (uv.min() < 0 or uv.max() > 1):
             yield Finding("warning", "TEXCOORD_RANGE", "texture coordinates outside [0, 1]", where)
@@ -187,13 +189,13 @@ def _check_features(gltf: Gltf, primitive: dict[str, Any], where: str) -> Iterat
             continue
         name = f"_FEATURE_ID_{feature['attribute']}"
         if name not in primitive["attributes"]:
-            raise DamagedFile(f"feature ids are in {name}, which is not there")
+            raise DamagedFile(f"feature ids are in {name}, which does not exist")
         ids = gltf.accessor(primitive["attributes"][name])
         if ids.min() < 0 or ids.max() >= feature["featureCount"] or (ids != np.rint(ids)).any():
             yield Finding("error", "FEATURE_ID", f"feature ids outside 0..{feature['featureCount'] - 1}", where)
         table = feature.get("propertyTable")
         if table is not None and table >= len(gltf.tables):
-            yield Finding("error", "PROPERTY_TABLE", f"there is no property table {table}", where)
+            yield Finding("error", "PROPERTY_TABLE", f"unknown property table {table}", where)
 
 
 def _check_property_tables(gltf: Gltf) -> Iterator[Finding]:
@@ -215,7 +217,7 @@ def _check_property_tables(gltf: Gltf) -> Iterator[Finding]:
                 continue
             expected = table["count"] + 1
             if len(offsets) != expected or (np.diff(offsets.astype(np.int64)) < 0).any() or offsets[-1] > len(values):
-                message = f"{key}: {len(offsets)} string offsets up to {offsets[-1:]}, expected {expected} rising ones"
+                message = f"{key}: {len(offsets)} string offsets up to {offsets[-1:]}, expected {expected} sorted"
                 yield Finding("error", "STRING_OFFSETS", message, where)
 
 
@@ -232,7 +234,7 @@ def _check_property_textures(gltf: Gltf) -> Iterator[Finding]:
             if key not in known:
                 yield Finding("error", "PROPERTY_TEXTURE", f"property {key} is not in its class", where)
             if not 0 <= texture.get("index", -1) < len(gltf.items("textures")):
-                yield Finding("error", "PROPERTY_TEXTURE", f"{key}: no texture {texture.get('index')}", where)
+                yield Finding("error", "PROPERTY_TEXTURE", f"{key}: unknown texture {texture.get('index')}", where)
 
 
 def _check_manifold(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:

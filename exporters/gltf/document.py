@@ -1,9 +1,9 @@
-"""The JSON document of a glTF file and its one buffer of bytes, as they grow.
+"""Builder of the JSON document of a glTF file and its single buffer.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 
-Written with `json`: the format is small, and the bytes stay ours (an object model such as pygltflib's
-costs 0.2 s to import and decides the order of keys).
+Written with `json`: the format is small, and the bytes are under control (an object model such as pygltflib's takes
+0.2 s to import and decides the order of keys).
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ Mode = Literal["ATTRIBUTES", "TRIANGLES", "INDICES"]
 
 
 class Document:
-    """A growing document.
+    """A document under construction.
 
     json : the document; `used` and `required`: names of its extensions
-    compressed : whether arrays are stored with EXT_meshopt_compression; their uncompressed form then exists as a
-        fallback buffer in name only, as the extension wants it
+    compressed : whether arrays are stored with EXT_meshopt_compression; their uncompressed form then exists as an
+        empty fallback buffer, as the extension requires
     """
 
     def __init__(self, compressed: bool = False) -> None:
@@ -46,12 +46,12 @@ class Document:
         return len(items) - 1
 
     def require(self, *extensions: str) -> None:
-        """Name extensions without which the file cannot be read."""
+        """Declare extensions as required."""
         self.used |= set(extensions)
         self.required |= set(extensions)
 
     def view(self, name: str, data: bytes, target: int | None = None) -> int:
-        """Append bytes as they are; returns the index of their bufferView."""
+        """Append bytes unchanged; returns the index of their bufferView."""
         view: dict[str, Any] = {"name": name, "buffer": 0, "byteOffset": self._append(data), "byteLength": len(data)}
         if target is not None:
             view["target"] = target
@@ -60,7 +60,7 @@ class Document:
     def accessor(self, name: str, array: NDArray[Any], target: int | None, mode: Mode, **more: Any) -> int:
         """Append an array, (N,) or (N, width), as one accessor in a bufferView of its own.
 
-        target : ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER or None; mode : how meshopt packs it, if it does
+        target : ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER or None; mode : of meshopt, if compressed
         """
         little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
         rows = little.reshape(len(little), -1)
@@ -75,7 +75,7 @@ class Document:
         return self.accessor_at(name, little, view, **more)
 
     def octahedral(self, name: str, normals: NDArray[np.float32]) -> int:
-        """Append unit vectors (N, 3), with their compression's own filter, as an accessor of 16-bit integers."""
+        """Append unit vectors (N, 3), with the octahedral filter of meshopt, as an accessor of 16-bit integers."""
         from exporters.gltf.meshopt import octahedral
 
         rows = octahedral(normals)
@@ -98,7 +98,7 @@ class Document:
         )
 
     def glb(self) -> bytes:
-        """The document and its buffer as one binary file."""
+        """Return the document and its buffer as one binary file."""
         binary = b"".join(self.chunks)
         binary += bytes(-len(binary) % 4)
         text = self.text({"byteLength": len(binary)})
@@ -106,7 +106,7 @@ class Document:
         return join_glb(text, binary)
 
     def text(self, buffer: dict[str, Any]) -> bytes:
-        """The document as JSON; buffer : how it names its bytes."""
+        """Return the document as JSON; buffer : its entry for the buffer."""
         head: dict[str, Any] = {"asset": self.json["asset"]}
         if self.used:
             head["extensionsUsed"] = sorted(self.used)
@@ -122,7 +122,7 @@ class Document:
         ).encode()
 
     def _append(self, data: bytes) -> int:
-        # Eight bytes suit every component type, and property tables demand it.
+        # Alignment to eight bytes suits every component type, and property tables require it.
         padding = -self.length % 8
         self.chunks += [bytes(padding), data]
         self.length += padding + len(data)

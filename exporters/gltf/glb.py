@@ -1,14 +1,14 @@
-"""glTF 2.0, as one binary file or as .gltf with a .bin and a texture beside it.
+"""Writer of glTF 2.0, as one binary file or as .gltf with a .bin and a texture next to it.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 
-Without a profile, extensions are only ever *used*, never *required*: CesiumJS refuses files that require what it does
-not know, and every viewer shows the figure without them. `exporters.profiles` says what the files for one client hold.
+Without a profile, extensions are only ever *used*, never *required*: CesiumJS rejects files that require unknown
+extensions, and every viewer shows the figure without them. For the files for one client see `exporters.profiles`.
 
-Place: the file has none of its own, and its node does not turn the figure. glTF has no georeference; the front of
-every model is +Z, and whoever puts it on a globe turns it: a tileset by its transform, CesiumJS by the heading of an
-entity, an artist by hand. A turned node would turn it twice there. Place and heading are in
-`asset.extras.georeference`. The one node transform that occurs, in quantised files, maps their integers to metres.
+Placement: the node does not rotate the figure. glTF has no georeference; the front of every model is +Z, and whatever
+places it on a globe rotates it: a tileset by its transform, CesiumJS by the heading of an entity, an artist by hand.
+A rotated node would rotate it twice there. Place and heading are in `asset.extras.georeference`. The only node
+transform, in quantised files, maps their integers to metres.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from exporters.solid import unit_normals
 
 
 def write_glb(asset: Asset, path: Path | str, profile: Profile = GENERAL) -> None:
-    """Write the finest level of detail as binary glTF, everything inside.
+    """Write the finest level of detail as a self-contained binary glTF.
 
     asset : vertices in the ASSET frame, written unchanged as float32 unless the profile compresses; its place goes
         into `asset.extras`
-    path : the .glb file, replaced if it exists; see `exporters.write.write` for writing it whole or not at all
-    profile : what the file's client takes
+    path : the .glb file, replaced if it exists; see `exporters.write.write` for writing it atomically
+    profile : of the client of the file
 
     Raises ExportError for a mesh without triangles or where the profile needs a package that is not installed,
-    OSError where the disk refuses.
+    OSError where it cannot be written.
     """
     Path(path).write_bytes(glb_bytes(asset, 0, profile))
 
 
 def glb_bytes(asset: Asset, lod: int = 0, profile: Profile = GENERAL) -> bytes:
-    """One level of detail of an asset as the bytes of a binary glTF file."""
+    """Return one level of detail of an asset as the bytes of a binary glTF file."""
     document, texture = _build(asset, lod, profile)
     if texture is not None:
         image = document.json["images"][0]
@@ -58,7 +58,7 @@ def glb_bytes(asset: Asset, lod: int = 0, profile: Profile = GENERAL) -> bytes:
 
 
 def write_gltf(asset: Asset, path: Path | str, profile: Profile = GENERAL) -> None:
-    """Write the finest level of detail as glTF in JSON, with `<stem>.bin` and `<stem>_texture.png` beside it.
+    """Write the finest level of detail as glTF in JSON, with `<stem>.bin` and `<stem>_texture.png` next to it.
 
     asset, profile, errors : as for `write_glb`; path : the .gltf file
     """
@@ -75,7 +75,7 @@ def write_gltf(asset: Asset, path: Path | str, profile: Profile = GENERAL) -> No
 
 
 def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture | None]:
-    """The document without the bytes of its image, and that image."""
+    """Build the document without the bytes of its image, and that image."""
     mesh = split_at_parts(asset.lods[lod])
     if not len(mesh.faces):
         raise ExportError(asset.name, f"level of detail {lod} has no triangles", "give a mesh with triangles")
@@ -109,7 +109,7 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         if solid is not None:
             item["extensions"] = {"EXT_mesh_manifold": solid}
     elif mesh.parts is not None:
-        # Of core glTF alone: a custom attribute with the labels; what they mean is on the node.
+        # In core glTF: a custom attribute with the labels; their names are on the node.
         attributes["_PART"] = document.accessor("part", mesh.parts.astype(np.float32), ARRAY_BUFFER, "ATTRIBUTES")
     if not profile.extensions:
         node |= _node_extras(asset, mesh)
@@ -134,7 +134,7 @@ def _about(document: Document, asset: Asset, profile: Profile) -> dict[str, Any]
 
 
 def _node_extras(asset: Asset, mesh: TexturedMesh) -> dict[str, Any]:
-    """Facts where clients without extensions look for them; Blender makes custom properties of them."""
+    """Facts for clients without extensions; Blender converts them to custom properties."""
     extras: dict[str, Any] = {}
     if mesh.parts is not None:
         labels = np.unique(mesh.parts).tolist()
@@ -149,12 +149,12 @@ def _node_extras(asset: Asset, mesh: TexturedMesh) -> dict[str, Any]:
 def _attributes(
     document: Document, mesh: TexturedMesh, node: dict[str, Any], lit: bool, profile: Profile
 ) -> dict[str, int]:
-    """Accessors of the vertices; quantised positions need a transform, which the node gets."""
+    """Add the accessors of the vertices; for quantised positions also the transform of the node."""
     normals = mesh.normals
     if not profile.extensions and normals is None:
-        normals = mesh.shading_normals  # the surface will be lit, and smooth only with these
+        normals = mesh.shading_normals  # the surface will be lit, and is smooth only with these
     elif profile.compressed and not lit:
-        normals = None  # nothing that reads this file would look at them
+        normals = None  # no client of this file uses them
     attributes = {}
 
     def add(semantic: str, name: str, array: Any, **more: Any) -> None:
@@ -170,7 +170,7 @@ def _attributes(
         if mesh.uv is not None:
             add("TEXCOORD_0", "texcoord", quantised_uv(mesh.uv), normalized=True)
     else:
-        # tolist() of float32 gives the very doubles that a reader gets from the buffer.
+        # tolist() of float32 gives the same doubles that a reader gets from the buffer.
         add("POSITION", "position", mesh.vertices, **_bounds(mesh.vertices))
         if normals is not None:
             add("NORMAL", "normal", unit_normals(normals))

@@ -1,4 +1,4 @@
-"""What is in a glTF file."""
+"""Facts about glTF files."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from georef.untrusted.damage import DamagedFile
 
 
 def gltf_facts(path: Path) -> dict[str, Any]:
-    """Facts about a .glb or .gltf file; see `exporters.inspect.inspect`."""
+    """Return facts about a .glb or .gltf file; see `exporters.inspect.inspect`."""
     gltf = read_gltf(path)
     try:
         return _facts(gltf)
     except DamagedFile as error:
-        raise ExportError(path, f"broken glTF ({error})", "see validate") from error
+        raise ExportError(path, f"broken glTF ({error})", "run fig2mesh validate") from error
 
 
 def _facts(gltf: Gltf) -> dict[str, Any]:
@@ -32,10 +32,10 @@ def _facts(gltf: Gltf) -> dict[str, Any]:
     vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
     faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
-    beside = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+    referenced = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
     return {
         "format": "glTF 2.0 binary" if gltf.path.suffix.lower() == ".glb" else "glTF 2.0",
-        "files": file_sizes(gltf.path, *beside),
+        "files": file_sizes(gltf.path, *referenced),
         "name": next((node["name"] for node in gltf.items("nodes") if "name" in node), None),
         "copyright": asset.get("copyright"),
         "generator": asset.get("generator"),
@@ -58,7 +58,7 @@ def _part_names(gltf: Gltf, table: dict[str, Any]) -> list[str]:
 
 
 def _observed(gltf: Gltf, table: dict[str, Any]) -> dict[str, float] | None:
-    """Share of each part that the drawing itself showed; None in files without."""
+    """Observed share of each part; None in files without."""
     if "observedShare" not in table.get("properties", {}):
         return None
     names, shares = _part_names(gltf, table), gltf.column(_column(table, "observedShare")["values"], "<f4")
@@ -70,5 +70,5 @@ def _observed(gltf: Gltf, table: dict[str, Any]) -> dict[str, float] | None:
 def _column(table: dict[str, Any], name: str) -> dict[str, Any]:
     columns: dict[str, dict[str, Any]] = table.get("properties", {})
     if name not in columns:
-        raise DamagedFile(f"its property table has no {name}")
+        raise DamagedFile(f"the property table has no {name}")
     return columns[name]

@@ -1,4 +1,4 @@
-"""What the Khronos glTF validator says of a file, where it is installed.
+"""Findings of the Khronos glTF validator, where it is installed.
 
 https://github.com/KhronosGroup/glTF-Validator
 """
@@ -14,8 +14,8 @@ from exporters.node_packages import find_package
 
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info", "info")  # the fourth are hints
 
-BLIND_SPOTS = ("UNSUPPORTED_EXTENSION", "UNUSED_OBJECT")
-"""Infos that only say that it does not know the extensions which we check here, nor what they refer to."""
+IGNORED_CODES = ("UNSUPPORTED_EXTENSION", "UNUSED_OBJECT")
+"""Infos about extensions that it does not know, which are checked in `exporters.gltf.check`."""
 
 TIMEOUT_S = 120
 
@@ -30,9 +30,9 @@ require(process.argv[1]).validateBytes(new Uint8Array(fs.readFileSync(file)), {
 
 
 def khronos_findings(path: Path, ktx2: frozenset[str] = frozenset()) -> list[Finding]:
-    """What the Khronos validator says about a file; one info finding where it is not installed.
+    """Return findings of the Khronos validator about a file; one info where it is not installed.
 
-    ktx2 : JSON pointers of the images that are KTX 2, of which it has not heard
+    ktx2 : JSON pointers of the KTX 2 images, which it does not support
     """
     tool = find_package("gltf-validator")
     if tool is None:
@@ -41,7 +41,7 @@ def khronos_findings(path: Path, ktx2: frozenset[str] = frozenset()) -> list[Fin
     try:
         run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        return [Finding("warning", "KHRONOS_VALIDATOR", f"not done within {TIMEOUT_S} s", path.name)]
+        return [Finding("warning", "KHRONOS_VALIDATOR", f"not finished within {TIMEOUT_S} s", path.name)]
     if run.returncode:
         return [Finding("warning", "KHRONOS_VALIDATOR", run.stderr.strip()[-300:], path.name)]
     return [
@@ -52,5 +52,5 @@ def khronos_findings(path: Path, ktx2: frozenset[str] = frozenset()) -> list[Fin
             f"{path.name}: {message.get('pointer') or message.get('offset', '')}",
         )
         for message in json.loads(run.stdout)["issues"]["messages"]
-        if message["code"] not in BLIND_SPOTS and message.get("pointer", "").removesuffix("/mimeType") not in ktx2
+        if message["code"] not in IGNORED_CODES and message.get("pointer", "").removesuffix("/mimeType") not in ktx2
     ]

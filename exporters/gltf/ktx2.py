@@ -21,7 +21,7 @@ from georef.untrusted.damage import DamagedFile
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 
 QUALITY = 255
-"""Of 255: drawings are lines and plain areas, where lower qualities leave blocks beside the lines."""
+"""Of 255: drawings are lines and plain areas, where lower qualities leave block artefacts near the lines."""
 
 _SCRIPT = """
 import { pathToFileURL } from 'node:url';
@@ -38,18 +38,18 @@ fs.writeSync(1, made);
 
 
 def encoder() -> tuple[str, Path]:
-    """Node.js and the folder of ktx2-encoder. Raises ExportError where either is missing."""
+    """Find Node.js and the folder of ktx2-encoder. Raises ExportError where either is missing."""
     tool = find_package("ktx2-encoder")
     if tool is None:
-        found = "KTX 2 needs Node.js and the npm package ktx2-encoder"
-        raise ExportError("--profile", found, "npm install ktx2-encoder, or take --profile cesiumjs")
+        finding = "KTX 2 needs Node.js and the npm package ktx2-encoder"
+        raise ExportError("--profile", finding, "npm install ktx2-encoder, or use --profile cesiumjs")
     return tool
 
 
 def encode(texture: Texture) -> bytes:
-    """A texture as a KTX 2 file: ETC1S, sRGB, with mip levels.
+    """Encode a texture as a KTX 2 file: ETC1S, sRGB, with mipmaps.
 
-    KHR_texture_basisu wants sides of multiples of four, see `padded`. Raises ExportError without Node.js or the
+    KHR_texture_basisu requires sides of multiples of four, see `padded`. Raises ExportError without Node.js or the
     package, or where the encoder fails.
     """
     tool = encoder()
@@ -62,13 +62,13 @@ def encode(texture: Texture) -> bytes:
     command = [tool[0], "--input-type=module", "-e", _SCRIPT, str(tool[1]), str(width), str(height), str(QUALITY)]
     run = subprocess.run(command, input=pixels.tobytes(), capture_output=True, check=False)
     if run.returncode or not run.stdout.startswith(IDENTIFIER):
-        reason = run.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no KTX 2 came out"]
-        raise ExportError("--profile", f"ktx2-encoder failed ({reason[0][:120]})", "take --profile cesiumjs")
+        reason = run.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no output"]
+        raise ExportError("--profile", f"ktx2-encoder failed ({reason[0][:120]})", "use --profile cesiumjs")
     return run.stdout
 
 
 def padded(mesh: TexturedMesh) -> TexturedMesh:
-    """The mesh with a texture whose sides are multiples of four: its last row and column repeated, `uv` shrunk."""
+    """Pad the texture to sides of multiples of four: its last row and column are repeated, `uv` is scaled."""
     if mesh.texture is None or mesh.uv is None:
         return mesh
     height, width = mesh.texture.pixels.shape[:2]
@@ -79,7 +79,7 @@ def padded(mesh: TexturedMesh) -> TexturedMesh:
     def grown(texture: Texture) -> Texture:
         return Texture(np.pad(texture.pixels, ((0, high - height), (0, wide - width), (0, 0)), mode="edge"))
 
-    # A mask of another size could not be padded by the same share of it.
+    # A mask of another size could not be padded proportionally.
     same = mesh.observed is not None and mesh.observed.pixels.shape[:2] == (height, width)
     observed = grown(mesh.observed) if mesh.observed is not None and same else None
     return replace(mesh, texture=grown(mesh.texture), observed=observed, uv=mesh.uv * (width / wide, height / high))
@@ -88,6 +88,6 @@ def padded(mesh: TexturedMesh) -> TexturedMesh:
 def size_of(data: bytes) -> tuple[int, int]:
     """Width and height of a KTX 2 file in pixels. Raises DamagedFile for other data."""
     if not data.startswith(IDENTIFIER) or len(data) < 48:
-        raise DamagedFile("no KTX 2 file")
+        raise DamagedFile("not a KTX 2 file")
     width, height = struct.unpack_from("<2I", data, 20)
     return int(width), int(height)

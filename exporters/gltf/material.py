@@ -1,4 +1,4 @@
-"""The one material of a figure in glTF, and its texture in the kinds that clients take.
+"""Material of a figure in glTF, and its texture in the formats that clients read.
 
 https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Khronos/KHR_materials_unlit
 https://github.com/KhronosGroup/glTF/tree/main/extensions/2.0/Vendor/EXT_texture_webp
@@ -24,12 +24,12 @@ TEXTURE_EXTENSIONS = {"webp": "EXT_texture_webp", "ktx2": "KHR_texture_basisu"}
 
 
 def material(document: Document, mesh: TexturedMesh, lit: bool, profile: Profile) -> int:
-    """Add the material and, without bytes yet, `images[0]` of a textured mesh; returns the material's index."""
+    """Add the material and, of a textured mesh, `images[0]` without data; returns the material's index."""
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 0.9}
     if mesh.texture is not None:
         wrap = {"wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE}
         document.json["samplers"] = [{"magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR, **wrap}]
-        document.json["images"] = [{"name": "texture"}]  # where its bytes are differs between .glb and .gltf
+        document.json["images"] = [{"name": "texture"}]  # its data is stored differently in .glb and .gltf
         texture: dict[str, Any] = {"sampler": 0}
         extension = TEXTURE_EXTENSIONS.get(profile.texture)
         if extension is None:
@@ -44,14 +44,14 @@ def material(document: Document, mesh: TexturedMesh, lit: bool, profile: Profile
         surface["baseColorFactor"] = [*np.round(mean, 4).tolist(), 1.0]
     item: dict[str, Any] = {"name": "drawing", "pbrMetallicRoughness": surface}
     if not lit and profile.extensions:
-        # A drawing brings its own light and shade. The fields beside it are what viewers without unlit show.
+        # Shading is part of the drawing. Viewers without unlit use the other fields.
         document.used.add("KHR_materials_unlit")
         item["extensions"] = {"KHR_materials_unlit": {}}
     return document.add("materials", item)
 
 
 def texture_file(texture: Texture, profile: Profile) -> tuple[bytes, str]:
-    """A texture as the bytes of a file of the profile's kind, and its MIME type.
+    """Encode a texture in the profile's format; returns the bytes of the file and its MIME type.
 
     Raises ExportError where the encoder is not installed.
     """
@@ -65,15 +65,15 @@ def texture_file(texture: Texture, profile: Profile) -> tuple[bytes, str]:
 
     pixels = texture.pixels[:, :, 0] if texture.pixels.shape[2] == 1 else texture.pixels
     stream = io.BytesIO()
-    # Lossless: the same pixels as the PNG. Exact, or colours under full transparency would change.
+    # Lossless: the same pixels as the PNG. Exact: keeps colours under full transparency.
     image = Image.fromarray(pixels)
     (image.convert("RGB") if image.mode == "L" else image).save(stream, "WEBP", lossless=True, exact=True, quality=50)
     return stream.getvalue(), "image/webp"
 
 
 def linear_rgba(colors: NDArray[np.uint8]) -> NDArray[np.uint16]:
-    """sRGB bytes (V, 3) as COLOR_0: linear light, 16 bits, opaque."""
-    # COLOR_0 is linear, and 8 bits of linear light band in the dark. Alpha keeps the rows at a multiple of 4 bytes.
+    """Convert sRGB bytes (V, 3) to COLOR_0: linear light, 16 bits, opaque."""
+    # COLOR_0 is linear, and 8 bits of linear light cause banding in dark colours. Alpha aligns the rows to 4 bytes.
     rgba = np.full((len(colors), 4), 65535, dtype=np.uint16)
     rgba[:, :3] = np.rint(linear_from_srgb(colors / 255.0) * 65535)
     return rgba

@@ -1,4 +1,4 @@
-"""What glTF says of a figure beyond its surface: the body parts, and that it is a solid.
+"""glTF extensions of a figure: body parts, observed surface and solid.
 
 https://github.com/CesiumGS/glTF/tree/3d-tiles-next/extensions/2.0/Vendor/EXT_mesh_features
 https://github.com/CesiumGS/glTF/tree/3d-tiles-next/extensions/2.0/Vendor/EXT_structural_metadata
@@ -21,10 +21,10 @@ NEAREST, CLAMP_TO_EDGE = 9728, 33071
 
 
 def features(document: Document, asset: Asset, mesh: TexturedMesh, attributes: dict[str, int]) -> dict[str, Any]:
-    """EXT_mesh_features of a primitive with parts, whose attribute is added to `attributes`; a table of the parts."""
+    """Add EXT_mesh_features of a primitive with parts, its entry in `attributes`, and a property table of the parts."""
     assert mesh.parts is not None
     labels, rows = np.unique(mesh.parts, return_inverse=True)
-    # float32 although the numbers are small: rows of one byte would break the 4-byte alignment of vertex attributes.
+    # float32 although the numbers are small: rows of one byte would violate the 4-byte alignment of vertex attributes.
     attributes["_FEATURE_ID_0"] = document.accessor("part", rows.astype(np.float32), ARRAY_BUFFER, "ATTRIBUTES")
     names = [asset.part_names.get(int(label), f"part_{label}").encode() for label in labels]
     offsets = np.cumsum([0, *map(len, names)]).astype("<u4")
@@ -34,7 +34,7 @@ def features(document: Document, asset: Asset, mesh: TexturedMesh, attributes: d
     }
     columns: dict[str, Any] = {
         "name": {
-            # Empty bufferViews are invalid, and all names could be empty strings.
+            # Empty bufferViews are invalid, and all names may be empty strings.
             "values": document.view("part names", b"".join(names) or b"\0"),
             "stringOffsets": document.view("part name offsets", offsets.tobytes()),
             "stringOffsetType": "UINT32",
@@ -63,10 +63,10 @@ def features(document: Document, asset: Asset, mesh: TexturedMesh, attributes: d
 
 
 def evidence(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
-    """EXT_structural_metadata of a primitive whose texels say what the drawing showed: a property texture `observed`,
-    1 where it did and 0 where the surface is inferred, texel for texel of the colours.
+    """Add EXT_structural_metadata of a primitive with a mask of observed texels: a property texture `observed`, 1 where
+    the drawing shows the surface and 0 where it is inferred, in the texture coordinates of the colours.
 
-    To be called after `features`, whose schema it adds to. None where the mesh has no such mask, or no texture.
+    Call it after `features`, whose schema it extends. None where the mesh has no such mask, or no texture.
     """
     if mesh.parts is None or mesh.observed is None or mesh.texture is None:
         return None
@@ -84,7 +84,7 @@ def evidence(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
             },
         },
     }
-    # A PNG whatever the colours are: masks are small, and every client that knows the extension reads it.
+    # Always a PNG: masks are small, and every client with the extension reads it.
     view = document.view("observed", mesh.observed.png)
     image = document.add("images", {"name": "observed", "bufferView": view, "mimeType": "image/png"})
     sampler = document.add(
@@ -100,9 +100,9 @@ def evidence(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
 def manifold(
     document: Document, mesh: TexturedMesh, corners: NDArray[Any], indices: int, position: int
 ) -> dict[str, Any] | None:
-    """EXT_mesh_manifold of a mesh: the merges that undo the texture seams.
+    """Add EXT_mesh_manifold of a mesh: the merges of vertices that undo the texture seams.
 
-    None where the result would not be a solid: we claim only what is so.
+    None where the result would not be a solid.
     """
     solid = solid_of(mesh)
     copies = solid.first[solid.vertex]
@@ -125,7 +125,7 @@ def manifold(
         "indices": {"bufferView": views[0], "componentType": COMPONENT_TYPES["u4"]},
         "values": {"bufferView": views[1]},
     }
-    # The extension demands the index data of both primitives to be one and the same.
+    # The extension requires that both primitives share their index data.
     shared = document.json["accessors"][indices]["bufferView"]
     primitive["indices"] = document.accessor_at("solid indices", corners, shared, sparse=sparse)
     return {"manifoldPrimitive": primitive, "mergeIndices": merge_indices, "mergeValues": merge_values}

@@ -1,7 +1,7 @@
-"""glTF files back into arrays: documents, buffers, accessors, images, and nodes with their transforms.
+"""Reader of glTF files: documents, buffers, accessors, images, and nodes with their transforms.
 
-What a document says is checked before it is believed: of types by `exporters.gltf.shape`, of numbers where they are
-used. Whatever is wrong is a `DamagedFile`; another kind of exception from here is a mistake of ours.
+Documents are validated before they are used: types by `exporters.gltf.shape`, numbers where they are used. Every
+problem raises `DamagedFile`; any other exception from here is a bug.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html
 """
@@ -28,79 +28,79 @@ from georef.untrusted.json_shape import check_shape
 
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 MAX_BYTES = 1 << 30
-"""Largest file, or file beside it, that is read: 3D Tiles' clients give up at a tenth."""
+"""Largest file, or referenced file, that is read: clients of 3D Tiles fail at a tenth of it."""
 
-FREE_NUMBERS, NUMBERS_A_BYTE = 1 << 22, 64
-"""How many numbers accessors may give: so many, and so many more for each byte of the buffers. Sound files are read
-some ten times over; a hundred thousand accessors of the same bytes would take hours. What nodes show counts as well."""
+FREE_NUMBERS, NUMBERS_PER_BYTE = 1 << 22, 64
+"""Limit of numbers read through accessors: a constant, and more for each byte of the buffers. Valid files are read some
+ten times; a hundred thousand accessors of the same bytes would take hours. Instances of meshes count as well."""
 
 MAX_SCENE_VERTICES = 20_000_000
-"""Of all instances of all meshes: nodes may show one mesh a million times."""
+"""Limit over all instances of all meshes: nodes may refer to one mesh a million times."""
 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
 
-class NotReadHere(DamagedFile):
-    """Sound data in a form that is not decoded here, or whose decoder is not installed."""
+class NotDecoded(DamagedFile):
+    """Valid data in a form that is not decoded here, or whose decoder is not installed."""
 
 
 @dataclass(frozen=True)
 class Gltf:
-    """A glTF file: `document`, the JSON; `buffers`, the bytes; `path`, where it came from."""
+    """A glTF file: `document`, the JSON; `buffers`, the bytes; `path`, its source."""
 
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
     path: Path
-    _given: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
+    _count_read: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
 
     def items(self, kind: str) -> list[dict[str, Any]]:
-        """A top-level array of the document, empty if absent."""
+        """Return a top-level array of the document, empty if absent."""
         found: list[dict[str, Any]] = self.document.get(kind, [])
         return found
 
     def item(self, kind: str, index: int) -> dict[str, Any]:
-        """An item of a top-level array. Raises DamagedFile for an index beyond its end."""
+        """Return an item of a top-level array. Raises DamagedFile for an index out of range."""
         found = self.items(kind)
         if index >= len(found):
-            raise DamagedFile(f"there are no {kind}/{index}")
+            raise DamagedFile(f"{kind}/{index} does not exist")
         return found[index]
 
     @property
     def extras(self) -> dict[str, Any]:
-        """The extras of the asset; empty where they are no object."""
+        """Extras of the asset; empty if they are not an object."""
         found = self.document.get("asset", {}).get("extras")
         return found if isinstance(found, dict) else {}
 
     @property
     def tables(self) -> list[dict[str, Any]]:
-        """The property tables of EXT_structural_metadata."""
+        """Property tables of EXT_structural_metadata."""
         found: list[dict[str, Any]] = self.extension("EXT_structural_metadata").get("propertyTables", [])
         return found
 
     def extension(self, name: str) -> dict[str, Any]:
-        """An extension of the document, empty where it has none of that name."""
+        """Return an extension of the document, empty if absent."""
         found: dict[str, Any] = self.document.get("extensions", {}).get(name, {})
         return found
 
     def column(self, view: int, dtype: str) -> NDArray[Any]:
-        """The numbers (N,) that a buffer view is full of. Raises DamagedFile where it holds no whole number of them."""
+        """Return a buffer view as numbers (N,). Raises DamagedFile if its length is not a multiple of their size."""
         data = self.view(view)
         if len(data) % np.dtype(dtype).itemsize:
-            raise DamagedFile(f"bufferView {view} of {len(data)} bytes is no column of {np.dtype(dtype).name}")
+            raise DamagedFile(f"bufferView {view} of {len(data)} bytes is not a column of {np.dtype(dtype).name}")
         return np.frombuffer(data, dtype)
 
     def texts(self, column: dict[str, Any]) -> list[str]:
-        """The texts in a column of a property table. Raises DamagedFile where they are none."""
+        """Return the strings in a column of a property table. Raises DamagedFile for invalid ones."""
         if "stringOffsets" not in column:
-            raise DamagedFile("a column of texts has no stringOffsets")
+            raise DamagedFile("a column of strings has no stringOffsets")
         data, offsets = bytes(self.view(column["values"])), self.column(column["stringOffsets"], "<u4").tolist()
-        with decoding("no UTF-8 in a property table", UnicodeDecodeError):
+        with decoding("invalid UTF-8 in a property table", UnicodeDecodeError):
             return [data[begin:end].decode() for begin, end in itertools.pairwise(offsets)]
 
     def view(self, index: int) -> bytes:
-        """The bytes of a buffer view, decompressed if they are compressed.
+        """Return the bytes of a buffer view, decompressed if necessary.
 
-        Raises DamagedFile where it lies outside its buffer, NotReadHere without the decoder.
+        Raises DamagedFile where it lies outside its buffer, NotDecoded without the decoder.
         """
         view = self.item("bufferViews", index)
         for name in MESHOPT:
@@ -110,12 +110,12 @@ class Gltf:
                 try:
                     return meshopt.decode(self._span(packed, index), packed)
                 except ExportError as error:
-                    raise NotReadHere(f"bufferView {index}: {error.finding}; {error.remedy}") from error
+                    raise NotDecoded(f"bufferView {index}: {error.finding}; {error.remedy}") from error
         return self._span(view, index)
 
     def _span(self, view: dict[str, Any], index: int) -> bytes:
         if view["buffer"] >= len(self.buffers):
-            raise DamagedFile(f"there is no buffer {view['buffer']}")
+            raise DamagedFile(f"buffer {view['buffer']} does not exist")
         data: bytes = self.buffers[view["buffer"]]
         begin, length = view.get("byteOffset", 0), view["byteLength"]
         if begin + length > len(data):
@@ -123,19 +123,19 @@ class Gltf:
         return data[begin : begin + length]
 
     def _charge(self, numbers: int) -> None:
-        """Count what is asked of the file. Raises NotReadHere beyond `FREE_NUMBERS` and `NUMBERS_A_BYTE`."""
-        self._given[0] += numbers
-        if self._given[0] > FREE_NUMBERS + NUMBERS_A_BYTE * sum(map(len, self.buffers)):
-            raise NotReadHere("its accessors hold far more than the file does")
+        """Count numbers read from the file. Raises NotDecoded beyond `FREE_NUMBERS` and `NUMBERS_PER_BYTE`."""
+        self._count_read[0] += numbers
+        if self._count_read[0] > FREE_NUMBERS + NUMBERS_PER_BYTE * sum(map(len, self.buffers)):
+            raise NotDecoded("its accessors contain far more than the file")
 
     def accessor(self, index: int) -> NDArray[Any]:
-        """An accessor's values, (N,) or (N, width), sparse replacements applied.
+        """Return an accessor's values, (N,) or (N, width), with sparse replacements applied.
 
-        Raises DamagedFile out of bounds, NotReadHere for more than a file of this size has to say.
+        Raises DamagedFile out of bounds, NotDecoded beyond the limit of numbers for a file of this size.
         """
         accessor = self.item("accessors", index)
         if accessor["type"] not in WIDTHS:
-            raise DamagedFile(f"accessor {index} is of type {accessor['type'][:20]}")
+            raise DamagedFile(f"accessor {index} is of unknown type {accessor['type'][:20]}")
         dtype, width, count = _dtype(accessor["componentType"]), WIDTHS[accessor["type"]], accessor["count"]
         self._charge(count * width)
         if "bufferView" in accessor:
@@ -154,7 +154,7 @@ class Gltf:
                 places["bufferView"], places.get("byteOffset", 0), index_type, sparse["count"], 1, None
             )
             if index_type.kind != "u" or rows.max() >= count:
-                raise DamagedFile(f"accessor {index}: sparse indices outside of its {count} elements")
+                raise DamagedFile(f"accessor {index}: sparse indices beyond its {count} elements")
             values = values.copy()
             values[rows[:, 0]] = self._strided(
                 replacements["bufferView"], replacements.get("byteOffset", 0), dtype, sparse["count"], width, None
@@ -162,7 +162,7 @@ class Gltf:
         return values[:, 0] if width == 1 else values
 
     def numbers(self, index: int) -> NDArray[Any]:
-        """An accessor's values as floats where it says that its integers are normalised, else as they are."""
+        """Return an accessor's values, converted to floats if its integers are normalised."""
         values = self.accessor(index)
         if not self.item("accessors", index).get("normalized") or values.dtype.kind == "f":
             return values
@@ -183,7 +183,7 @@ class Gltf:
         return np.ndarray((count, width), dtype, data, offset, (step, dtype.itemsize))
 
     def image(self, index: int) -> bytes:
-        """The bytes of an image file, embedded or beside the document. Raises DamagedFile where there are none."""
+        """Return the bytes of an image file, embedded or referenced. Raises DamagedFile if there are none."""
         item = self.item("images", index)
         if "bufferView" in item:
             return bytes(self.view(item["bufferView"]))
@@ -192,9 +192,9 @@ class Gltf:
         return _resource(self.path, item["uri"])
 
     def mesh_arrays(self, mesh: int = 0, primitive: int = 0) -> tuple[NDArray[Any], NDArray[np.int64]]:
-        """Positions (V, 3) and triangles (F, 3) of one primitive, in the frame of its mesh.
+        """Return positions (V, 3) and triangles (F, 3) of one primitive, in the frame of its mesh.
 
-        Strips and fans become triangles; points and lines have none. Raises NotReadHere for Draco's compression.
+        Strips and fans are converted to triangles; points and lines have none. Raises NotDecoded for Draco compression.
         """
         item = self.primitives(mesh)[primitive]
         positions = self._positions(item)
@@ -204,38 +204,38 @@ class Gltf:
         return positions, _triangles(indices, item.get("mode", 4))
 
     def primitives(self, mesh: int) -> list[dict[str, Any]]:
-        """The primitives of a mesh."""
+        """Return the primitives of a mesh."""
         found: list[dict[str, Any]] = self.item("meshes", mesh)["primitives"]
         return found
 
     def _positions(self, primitive: dict[str, Any]) -> NDArray[Any]:
-        """(V, 3), none where a primitive has no positions."""
+        """Positions (V, 3), empty if a primitive has none."""
         if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-            raise NotReadHere("compressed with Draco")
+            raise NotDecoded("compressed with Draco")
         if "POSITION" not in primitive["attributes"]:
             return np.empty((0, 3), np.float32)
         return self.vectors(primitive["attributes"]["POSITION"], 3)
 
     def vectors(self, accessor: int, width: int) -> NDArray[Any]:
-        """(N, width) `numbers` of an accessor. Raises DamagedFile where it has others."""
+        """Return (N, width) `numbers` of an accessor. Raises DamagedFile for another shape."""
         found = self.numbers(accessor)
         if found.ndim != 2 or found.shape[1] != width:
-            raise DamagedFile(f"accessor {accessor} holds no vectors of {width}")
+            raise DamagedFile(f"accessor {accessor} does not contain vectors of {width}")
         return found
 
     def _indices(self, accessor: int, count: int) -> NDArray[np.int64]:
         """(N,) indices below `count`."""
         found = self.accessor(accessor)
         if found.ndim != 1 or found.dtype.kind != "u":
-            raise DamagedFile(f"accessor {accessor} holds no indices")
+            raise DamagedFile(f"accessor {accessor} does not contain indices")
         if found.max() >= count:
             raise DamagedFile(f"index {int(found.max())} of {count} vertices")
         return found.astype(np.int64)
 
     def solid_arrays(self, mesh: int = 0) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Positions and triangles of a mesh with its seams undone.
+        """Return positions and triangles of a mesh with its seams merged.
 
-        By EXT_mesh_manifold where the file has it, else by merging equal positions of all primitives.
+        By EXT_mesh_manifold if the file has it, else by merging equal positions of all primitives.
         """
         item = self.item("meshes", mesh)
         extension = item.get("extensions", {}).get("EXT_mesh_manifold")
@@ -252,19 +252,19 @@ class Gltf:
         return merged_by_position(positions, faces)
 
     def instances(self) -> list[tuple[int, NDArray[np.float64]]]:
-        """The meshes of the default scene, each with its (4, 4) matrix scene_from_mesh."""
+        """Return the meshes of the default scene, each with its (4, 4) matrix scene_from_mesh."""
         nodes, found = self.items("nodes"), []
         scenes = self.items("scenes")
         below = {child for node in nodes for child in node.get("children", [])}
         scene = self.item("scenes", self.document.get("scene") or 0) if scenes else {}
         roots = scene.get("nodes", []) if scenes else set(range(len(nodes))) - below
         pending = [(index, np.eye(4)) for index in roots]
-        met: set[int] = set()
+        visited: set[int] = set()
         while pending:
             index, above = pending.pop()
-            if index in met:
+            if index in visited:
                 raise DamagedFile(f"node {index} has two parents, or nodes form a cycle")
-            met.add(index)
+            visited.add(index)
             node = self.item("nodes", index)
             matrix = above @ local_matrix(node)
             if "mesh" in node:
@@ -273,7 +273,7 @@ class Gltf:
         return found
 
     def scene_vertices(self) -> NDArray[np.float64]:
-        """All vertices (N, 3) float64 of the default scene, y-up: the ASSET frame of files of ours."""
+        """Return all vertices (N, 3) float64 of the default scene, y-up: the ASSET frame of files by fig2mesh."""
         clouds = [np.empty((0, 3))]
         count = 0
         for mesh, matrix in self.instances():
@@ -285,7 +285,7 @@ class Gltf:
         return np.concatenate(clouds)
 
     def scene_solids(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-        """Positions and triangles of each mesh of the default scene where it stands there, its seams undone."""
+        """Return positions and triangles of each mesh instance of the default scene, with seams merged."""
         solids = []
         count = 0
         known: dict[int, tuple[NDArray[Any], NDArray[Any]]] = {}
@@ -300,20 +300,20 @@ class Gltf:
 
 def _counted(count: int, more: int) -> int:
     if count + more > MAX_SCENE_VERTICES:
-        raise NotReadHere(f"more than {MAX_SCENE_VERTICES / 1e6:.0f} million vertices or triangles in its scene")
+        raise NotDecoded(f"more than {MAX_SCENE_VERTICES / 1e6:.0f} million vertices or triangles in the scene")
     return count + more
 
 
 def _moved(vertices: NDArray[Any], matrix: NDArray[np.float64]) -> NDArray[Any]:
     if np.array_equal(matrix, np.eye(4)):
-        return vertices  # as they are in the file, to the bit
+        return vertices  # bitwise unchanged
     return vertices.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """Corners (F, 3) of triangles, a strip or a fan, by the `mode` of the primitive; none for points and lines."""
+    """Convert indices to triangles (F, 3) by the `mode` of the primitive; empty for points and lines."""
     if mode == 4 and len(indices) % 3:
-        raise DamagedFile(f"{len(indices)} indices are no triangles")
+        raise DamagedFile(f"{len(indices)} indices are not a multiple of 3")
     if mode == 4:
         return indices.reshape(-1, 3)
     if mode not in (5, 6) or len(indices) < 3:
@@ -327,12 +327,12 @@ def _triangles(indices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
 
 def _dtype(component: int) -> np.dtype[Any]:
     if component not in DTYPES:
-        raise DamagedFile(f"componentType {component}")
+        raise DamagedFile(f"unknown componentType {component}")
     return np.dtype(DTYPES[component])
 
 
 def local_matrix(node: dict[str, Any]) -> NDArray[np.float64]:
-    """(4, 4) matrix that takes what is in a node to the node above; its quaternion is taken to be of length 1."""
+    """(4, 4) matrix from a node to its parent; its quaternion must be a unit quaternion."""
     if "matrix" in node:
         return np.asarray(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
@@ -351,21 +351,21 @@ def _resource(path: Path, uri: str) -> bytes:
     if uri.startswith("data:"):
         import base64
 
-        with decoding("no base64 in an address", ValueError):
+        with decoding("invalid base64 in a data URI", ValueError):
             return base64.b64decode(uri.partition(",")[2])
     try:
         return read_bytes(path.parent / unquote(uri), MAX_BYTES)
     except OSError as error:
-        raise DamagedFile(f"{uri[:80]} is not there ({error.strerror})") from error
+        raise DamagedFile(f"{uri[:80]} cannot be read ({error.strerror})") from error
     except DamagedFile as error:
         raise DamagedFile(f"{uri[:80]}: {error}") from error
 
 
 def read_gltf(path: Path | str) -> Gltf:
-    """Open a .glb or .gltf file.
+    """Read a .glb or .gltf file.
 
-    Raises ExportError for files that are not there, cut off or no glTF at all; what is wrong inside a document is
-    for `exporters.validate` to say.
+    Raises ExportError for files that are missing, truncated or not glTF; other problems in a document are reported by
+    `exporters.validate`.
     """
     path = Path(path)
     try:
@@ -373,33 +373,33 @@ def read_gltf(path: Path | str) -> Gltf:
         text, binary = (data, None) if path.suffix.lower() == ".gltf" else split_glb(data)
         return _gltf(text, binary, path)
     except OSError as error:
-        raise ExportError(path, f"no readable glTF ({error.strerror})", "check the name") from error
+        raise ExportError(path, f"cannot be read ({error.strerror})", "check the path") from error
     except DamagedFile as error:
-        raise ExportError(path, f"no readable glTF ({error})", "write it again") from error
+        raise ExportError(path, f"not a valid glTF file ({error})", "write it again") from error
 
 
 def open_glb(path: Path) -> Gltf:
-    """A .glb file mapped into memory: its JSON is parsed, its buffer read where `view` and `accessor` look.
+    """Map a .glb file into memory: its JSON is parsed, its buffer read on demand by `view` and `accessor`.
 
-    `view` gives memoryviews, valid as long as the record. Raises ExportError for what is no binary glTF.
+    `view` gives memoryviews, valid as long as the record. Raises ExportError for files that are not binary glTF.
     """
     try:
         return glb_of(mapped(path), path)
     except OSError as error:
-        raise ExportError(path, f"no readable glTF ({error.strerror})", "check the name") from error
+        raise ExportError(path, f"cannot be read ({error.strerror})", "check the path") from error
     except DamagedFile as error:
-        raise ExportError(path, f"no readable glTF ({error})", "check the name") from error
+        raise ExportError(path, f"not a valid glTF file ({error})", "check the path") from error
 
 
 def glb_of(data: Bytes, path: Path) -> Gltf:
-    """The record of a .glb file's bytes; path : for messages. Raises ExportError for what is no binary glTF."""
+    """Parse the bytes of a .glb file; path : for messages. Raises ExportError for anything but binary glTF."""
     try:
         gltf = _gltf(*split_glb(data), path)
         if any("uri" in item for item in gltf.items("buffers")):
-            raise DamagedFile("keeps its buffers in other files")
+            raise DamagedFile("its buffers are in other files")
         return gltf
     except DamagedFile as error:
-        raise ExportError(path, f"no readable glTF ({error})", "give a .glb") from error
+        raise ExportError(path, f"not a valid glTF file ({error})", "give a .glb") from error
 
 
 def _gltf(text: Bytes, binary: Bytes | None, path: Path) -> Gltf:
@@ -408,7 +408,7 @@ def _gltf(text: Bytes, binary: Bytes | None, path: Path) -> Gltf:
     buffers = []
     for index, item in enumerate(document.get("buffers", [])):
         if "uri" not in item and any(item.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT):
-            buffers.append(b"")  # stands for what the compressed views hold
+            buffers.append(b"")  # placeholder for the decompressed data
             continue
         data = _resource(path, item["uri"]) if "uri" in item else binary
         if data is None or len(data) < item["byteLength"]:

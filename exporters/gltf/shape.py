@@ -1,6 +1,6 @@
-"""What the readers of glTF take for granted of a document, which `exporters.gltf.reader` checks before.
+"""Shape of glTF documents, which `exporters.gltf.reader` checks before using them.
 
-Only members that are used here are named; the full rules are for the Khronos validator. Extras may be anything.
+Only members that are used here are included; the Khronos validator checks all rules. Extras may be anything.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#properties-reference
 """
@@ -9,89 +9,93 @@ from __future__ import annotations
 
 from typing import Any
 
-from georef.untrusted.json_shape import WHOLE, Needed, Nullable, Numbers, Values
+from georef.untrusted.json_shape import INDEX, Nullable, Numbers, Required, Values
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
-_SPAN = {"buffer": Needed(WHOLE), "byteOffset": WHOLE, "byteLength": Needed(WHOLE), "byteStride": WHOLE}
-_PACKED = _SPAN | {"byteStride": Needed(WHOLE), "count": Needed(WHOLE), "mode": Needed(str), "filter": str}
-_PART_OF_VIEW = {"bufferView": Needed(WHOLE), "byteOffset": WHOLE}
+_SPAN = {"buffer": Required(INDEX), "byteOffset": INDEX, "byteLength": Required(INDEX), "byteStride": INDEX}
+_PACKED = _SPAN | {"byteStride": Required(INDEX), "count": Required(INDEX), "mode": Required(str), "filter": str}
+_PART_OF_VIEW = {"bufferView": Required(INDEX), "byteOffset": INDEX}
 
 _ACCESSOR = {
-    "bufferView": WHOLE,
-    "byteOffset": WHOLE,
-    "componentType": Needed(WHOLE),
-    "count": Needed(WHOLE),
-    "type": Needed(str),
+    "bufferView": INDEX,
+    "byteOffset": INDEX,
+    "componentType": Required(INDEX),
+    "count": Required(INDEX),
+    "type": Required(str),
     "normalized": bool,
     "min": Numbers(),
     "max": Numbers(),
     "sparse": {
-        "count": Needed(WHOLE),
-        "indices": Needed(_PART_OF_VIEW | {"componentType": Needed(WHOLE)}),
-        "values": Needed(_PART_OF_VIEW),
+        "count": Required(INDEX),
+        "indices": Required(_PART_OF_VIEW | {"componentType": Required(INDEX)}),
+        "values": Required(_PART_OF_VIEW),
     },
 }
 
-_FEATURE_IDS = {"attribute": WHOLE, "featureCount": Needed(WHOLE), "propertyTable": WHOLE}
+_FEATURE_IDS = {"attribute": INDEX, "featureCount": Required(INDEX), "propertyTable": INDEX}
 
 _PRIMITIVE = {
-    "attributes": Needed(Values(WHOLE)),
-    "indices": WHOLE,
-    "material": WHOLE,
-    "mode": WHOLE,
+    "attributes": Required(Values(INDEX)),
+    "indices": INDEX,
+    "material": INDEX,
+    "mode": INDEX,
     "extensions": {"EXT_mesh_features": {"featureIds": [_FEATURE_IDS]}},
 }
 
 _MANIFOLD = {
-    "manifoldPrimitive": Needed({"indices": Needed(WHOLE), "attributes": Needed(Values(WHOLE))}),
+    "manifoldPrimitive": Required({"indices": Required(INDEX), "attributes": Required(Values(INDEX))}),
 }
 
-_COLUMN = {"values": Needed(WHOLE), "stringOffsets": WHOLE, "arrayOffsets": WHOLE}
+_COLUMN = {"values": Required(INDEX), "stringOffsets": INDEX, "arrayOffsets": INDEX}
 
 _STRUCTURAL_METADATA = {
     "schema": {
-        "classes": Values({"properties": Values({"type": Needed(str), "componentType": str, "array": bool})}),
+        "classes": Values({"properties": Values({"type": Required(str), "componentType": str, "array": bool})}),
     },
-    "propertyTables": [{"class": Needed(str), "count": Needed(WHOLE), "properties": Values(_COLUMN)}],
-    "propertyTextures": [{"class": Needed(str), "properties": Values({"index": WHOLE})}],
+    "propertyTables": [{"class": Required(str), "count": Required(INDEX), "properties": Values(_COLUMN)}],
+    "propertyTextures": [{"class": Required(str), "properties": Values({"index": INDEX})}],
 }
+
+_TARGET = {"node": INDEX, "path": Required(str)}
 
 DOCUMENT: dict[str, Any] = {
     "asset": {"copyright": str},
     "extensionsUsed": [str],
     "extensionsRequired": [str],
-    "scene": Nullable(WHOLE),
-    "scenes": [{"nodes": [WHOLE]}],
+    "scene": Nullable(INDEX),
+    "scenes": [{"nodes": [INDEX]}],
     "nodes": [
         {
             "name": str,
-            "children": [WHOLE],
-            "mesh": WHOLE,
-            "skin": WHOLE,
+            "children": [INDEX],
+            "mesh": INDEX,
+            "skin": INDEX,
             "matrix": Numbers(16),
             "translation": Numbers(3),
             "rotation": Numbers(4),
             "scale": Numbers(3),
         }
     ],
-    "meshes": [{"primitives": Needed([_PRIMITIVE]), "extensions": {"EXT_mesh_manifold": _MANIFOLD}}],
+    "meshes": [{"primitives": Required([_PRIMITIVE]), "extensions": {"EXT_mesh_manifold": _MANIFOLD}}],
     "accessors": [_ACCESSOR],
     "bufferViews": [_SPAN | {"extensions": dict.fromkeys(MESHOPT, _PACKED)}],
     "buffers": [
-        {"byteLength": Needed(WHOLE), "uri": str, "extensions": {name: {"fallback": bool} for name in MESHOPT}}
+        {"byteLength": Required(INDEX), "uri": str, "extensions": {name: {"fallback": bool} for name in MESHOPT}}
     ],
-    "images": [{"bufferView": WHOLE, "uri": str, "mimeType": str}],
-    "textures": [{"source": WHOLE, "sampler": WHOLE}],
+    "images": [{"bufferView": INDEX, "uri": str, "mimeType": str}],
+    "textures": [{"source": INDEX, "sampler": INDEX}],
     "samplers": [dict],
     "materials": [{"name": str, "pbrMetallicRoughness": {"baseColorFactor": Numbers(4)}}],
-    "skins": [{"inverseBindMatrices": WHOLE, "joints": Needed([WHOLE])}],
+    "skins": [{"inverseBindMatrices": INDEX, "joints": Required([INDEX])}],
     "animations": [
         {
             "name": str,
-            "channels": Needed([{"sampler": Needed(WHOLE), "target": Needed({"node": WHOLE, "path": Needed(str)})}]),
-            "samplers": Needed([{"input": Needed(WHOLE), "output": Needed(WHOLE), "interpolation": str}]),
+            "channels": Required(
+                [{"sampler": Required(INDEX), "target": Required({"node": INDEX, "path": Required(str)})}]
+            ),
+            "samplers": Required([{"input": Required(INDEX), "output": Required(INDEX), "interpolation": str}]),
         }
     ],
-    "extensions": {"EXT_structural_metadata": _STRUCTURAL_METADATA, "CESIUM_RTC": {"center": Needed(Numbers(3))}},
+    "extensions": {"EXT_structural_metadata": _STRUCTURAL_METADATA, "CESIUM_RTC": {"center": Required(Numbers(3))}},
 }

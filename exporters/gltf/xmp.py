@@ -20,9 +20,9 @@ NAMESPACES = {
 
 
 def packet(asset: Asset) -> dict[str, Any]:
-    """The packet of an asset: title, rights, source, place, and what made it.
+    """Return the packet of an asset: title, rights, source, place, and the creator tool.
 
-    Who made the drawing is not said: a credit line may name a publisher, a library or a licence as well.
+    It has no dc:creator: a credit line may name a publisher, a library or a licence as well.
     """
     facts: dict[str, Any] = {"@context": NAMESPACES, "@id": "", "dc:title": _in_any_language(asset.name)}
     if asset.copyright:
@@ -32,7 +32,7 @@ def packet(asset: Asset) -> dict[str, Any]:
         facts["dc:source"] = source
     if asset.placement is not None:
         place = asset.placement
-        # DCMI Point: degrees on WGS 84 unless it says otherwise.
+        # DCMI Point: degrees on WGS 84 by default.
         facts["dc:coverage"] = (
             f"east={place.lon_deg!r}; north={place.lat_deg!r}; elevation={place.height_m!r}; "
             "zunits=metres above the ellipsoid of WGS 84"

@@ -1,8 +1,8 @@
-"""Batched 3D Models: what 3D Tiles 1.0 wraps round binary glTF, for clients that do not know version 1.1.
+"""Batched 3D Models: the container for binary glTF in 3D Tiles 1.0, for clients that do not support version 1.1.
 
 https://github.com/CesiumGS/3d-tiles/tree/1.0/specification/TileFormats/Batched3DModel
 
-Feature ids and their table move from glTF extensions, which such clients do not know either, into the attribute
+Feature ids and their table move from glTF extensions, which such clients do not support either, to the attribute
 `_BATCHID` and the batch table. Vertices are local to the tile, so no RTC_CENTER is needed.
 """
 
@@ -23,7 +23,7 @@ from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
 HEADER = struct.Struct("<4sIIIIII")
-"""magic, version, bytes in all, of the feature table's JSON and binary, of the batch table's JSON and binary."""
+"""magic, version, byte lengths: total, feature table's JSON and binary, batch table's JSON and binary."""
 
 MESH_FEATURES, STRUCTURAL_METADATA = "EXT_mesh_features", "EXT_structural_metadata"
 # fmt: off
@@ -35,24 +35,26 @@ SCALARS = {
 
 
 def b3dm_bytes(glb: bytes, name: Path | str) -> bytes:
-    """A binary glTF file as a batched 3D model.
+    """Convert a binary glTF file to a batched 3D model.
 
     glb : the file's bytes, as `exporters.gltf.glb` writes them
     name : the file, for messages
 
-    Raises ExportError for what is no binary glTF, or needs extensions to be read.
+    Raises ExportError for anything but binary glTF, and for files that require extensions.
     """
     gltf = glb_of(glb, Path(name))
     try:
         return _b3dm(gltf)
     except DamagedFile as error:
-        raise ExportError(name, f"broken glTF ({error})", "see validate") from error
+        raise ExportError(name, f"broken glTF ({error})", "run fig2mesh validate") from error
 
 
 def _b3dm(gltf: Gltf) -> bytes:
     required = gltf.document.get("extensionsRequired", [])
     if required:
-        raise ExportError(gltf.path, f"needs {', '.join(required)}, newer than 3D Tiles 1.0", "give a plain .glb")
+        raise ExportError(
+            gltf.path, f"requires {', '.join(required)}, which 3D Tiles 1.0 does not support", "give a plain .glb"
+        )
     columns = _batch_table(gltf)
     length = max((len(values) for values in columns.values()), default=0)
     feature_table = _json({"BATCH_LENGTH": length}, HEADER.size)
@@ -69,7 +71,7 @@ def _json(content: dict[str, Any], before: int) -> bytes:
 
 
 def part_table(gltf: Gltf) -> dict[str, list[Any]]:
-    """The columns of the one property table of a figure, property → values; empty where there is none."""
+    """Return the columns of the single property table of a figure, property → values; empty without one."""
     if len(gltf.tables) != 1:
         return {}
     table = gltf.tables[0]
@@ -81,12 +83,12 @@ def part_table(gltf: Gltf) -> dict[str, list[Any]]:
             raise DamagedFile(f"property {key[:40]} is not in the schema")
         kind = kinds[key]
         if kind.get("array"):
-            continue  # a batch table of 1.0 has no binary arrays, and figures have none
+            continue  # batch tables of 1.0 have no binary arrays, nor do figures
         if kind["type"] == "STRING":
             columns[key] = gltf.texts(column)
         elif kind["type"] == "SCALAR" and kind.get("componentType") in SCALARS:
             values = gltf.column(column["values"], SCALARS[kind["componentType"]])[: table["count"]]
-            # The shortest decimals that give the same float32 back.
+            # The shortest decimals that restore the same float32.
             columns[key] = [float(str(value)) if values.dtype.kind == "f" else int(value) for value in values]
     return columns
 
@@ -99,7 +101,7 @@ def _batch_table(gltf: Gltf) -> dict[str, list[Any]]:
 
 
 def _rewritten(gltf: Gltf, batched: bool) -> bytes:
-    """The glTF without the extensions that carried the parts, and without the bytes that only they referred to."""
+    """Return the glTF without the extensions of the parts, and without the data that only they refer to."""
     document: dict[str, Any] = json.loads(json.dumps(gltf.document))
     metadata = document.get("extensions", {}).pop(STRUCTURAL_METADATA, {})
     tables = metadata.get("propertyTables", [])
@@ -128,13 +130,13 @@ def _rewritten(gltf: Gltf, batched: bool) -> bytes:
     binary = _repacked(document, gltf, dropped)
     document["buffers"] = [{"byteLength": len(binary)}]
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
-    # Both chunks fill multiples of eight bytes, as the whole tile has to; the headers of the chunks add 12 + 8 + 8.
+    # Both chunks are padded to multiples of eight bytes, as the whole tile must be; the chunk headers add 12 + 8 + 8.
     text += b" " * ((4 - len(text)) % 8)
     return join_glb(text, binary)
 
 
 def _without_images_of(document: dict[str, Any], property_textures: list[dict[str, Any]]) -> set[int]:
-    """Take the textures of property textures away, where they are the last ones, with their images and samplers.
+    """Remove the textures of property textures, if they are the last ones, with their images and samplers.
 
     returns : the buffer views of those images
     """
@@ -143,9 +145,9 @@ def _without_images_of(document: dict[str, Any], property_textures: list[dict[st
     for index in sorted(wanted, reverse=True):
         textures, images, samplers = (document.get(kind, []) for kind in ("textures", "images", "samplers"))
         if index >= len(textures):
-            raise DamagedFile(f"there is no texture {index}")
+            raise DamagedFile(f"texture {index} does not exist")
         texture = textures[index]
-        # Others would have to be renumbered; ours come last.
+        # Others would have to be renumbered; fig2mesh writes these last.
         if (index, texture.get("source"), texture.get("sampler")) != tuple(
             len(items) - 1 for items in (textures, images, samplers)
         ):
@@ -159,7 +161,7 @@ def _without_images_of(document: dict[str, Any], property_textures: list[dict[st
 
 
 def _repacked(document: dict[str, Any], gltf: Gltf, dropped: set[int]) -> bytes:
-    """Buffer views without the dropped ones, one after the other; indices in the document are changed."""
+    """Concatenate the buffer views without the dropped ones; indices in the document are updated."""
     kept = [index for index in range(len(gltf.items("bufferViews"))) if index not in dropped]
     number = {old: new for new, old in enumerate(kept)}
     chunks: list[bytes] = []
@@ -174,7 +176,7 @@ def _repacked(document: dict[str, Any], gltf: Gltf, dropped: set[int]) -> bytes:
         views.append(view)
     document["bufferViews"] = views
     if any(view not in number for view in _named_views(document)):
-        raise DamagedFile("a buffer view is named that is not there, or that held a property table")
+        raise DamagedFile("reference to a buffer view that does not exist, or that belongs to a property table")
     for accessor in document.get("accessors", []):
         sparse = accessor.get("sparse", {})
         for holder in (accessor, sparse.get("indices", {}), sparse.get("values", {})):
@@ -197,7 +199,7 @@ def _named_views(document: dict[str, Any]) -> Iterator[int]:
 
 @dataclass(frozen=True)
 class B3dm:
-    """A batched 3D model: its two tables' JSON and the binary glTF inside."""
+    """A batched 3D model: the JSON of its two tables and the contained binary glTF."""
 
     feature_table: dict[str, Any]
     batch_table: dict[str, Any]
@@ -205,19 +207,19 @@ class B3dm:
 
 
 def read_b3dm(data: bytes) -> B3dm:
-    """Take a batched 3D model apart. Raises DamagedFile where header, lengths or alignment break the rules."""
+    """Parse a batched 3D model. Raises DamagedFile for an invalid header, lengths or alignment."""
     if len(data) < HEADER.size:
         raise DamagedFile(f"{len(data)} bytes, less than the header")
     magic, version, total, *lengths = HEADER.unpack_from(data)
     if magic != b"b3dm" or version != 1:
         raise DamagedFile(f"starts with {magic!r} version {version}, expected b'b3dm' version 1")
     if total != len(data) or sum(lengths) + HEADER.size > total:
-        raise DamagedFile(f"header says {total} bytes with tables of {lengths}, file has {len(data)}")
+        raise DamagedFile(f"header declares {total} bytes with tables of {lengths}, file has {len(data)}")
     ends = [HEADER.size + end for end in itertools.accumulate(lengths)]
     if total % 8 or ends[1] % 8 or ends[3] % 8:
         raise DamagedFile(f"tables end at {ends[1]} and {ends[3]}, the tile at {total}: not multiples of 8")
     feature_table = parse_json(data[HEADER.size : ends[0]])
     batch_table = parse_json(data[ends[1] : ends[2]]) if lengths[2] else {}
     if not isinstance(feature_table, dict) or not isinstance(batch_table, dict):
-        raise DamagedFile("a table is no JSON object")
+        raise DamagedFile("a table is not a JSON object")
     return B3dm(feature_table, batch_table, data[ends[3] :])

@@ -1,5 +1,5 @@
-"""Checks of 3D Tiles: the rules of tileset.json, that every vertex lies inside the volumes that promise it, and that
-every figure stands where its own file says.
+"""Checks of 3D Tiles: the rules of tileset.json, that all vertices lie inside their bounding volumes, and that every
+figure is at the place recorded in its file.
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html
 """
@@ -26,20 +26,20 @@ from exporters.tiles.volumes import Matrix, Volume, read_transform, volume_probl
 from georef.errors import PlacementError
 from georef.geodesy import ecef_from_tile
 from georef.untrusted.damage import DamagedFile, decoding
-from georef.untrusted.json_file import is_there, read_json
-from georef.untrusted.json_shape import Needed, check_shape
+from georef.untrusted.json_file import is_plain_file, read_json
+from georef.untrusted.json_shape import Required, check_shape
 
 INSIDE_TOLERANCE_M = 1e-6
-"""Vertices this far outside a volume pass: float64 ECEF coordinates are good to 1e-9 m, boxes may be shared."""
+"""Tolerance of vertices outside a volume; float64 ECEF coordinates are accurate to 1e-9 m."""
 
 CHILD_TOLERANCE_M = 1e-3
-"""Volumes of children may reach this far out of their parents': viewers lose nothing by it."""
+"""Tolerance of volumes of children outside those of their parents, harmless for viewers."""
 
 PLACE_TOLERANCE_M, TURN_TOLERANCE_DEG = 1e-3, 0.01
-"""What we promise of the feet and the nose."""
+"""Guaranteed accuracy of the position and heading of figures."""
 
-MAX_SAME_FILE = 20
-"""How often one file is looked into: tilesets may name it a million times, and each other twice, without end."""
+MAX_VISITS_PER_FILE = 20
+"""Limit of checks of one file: tilesets may refer to it a million times, or to each other exponentially often."""
 
 SINCE_1_1 = ("schema", "schemaUri", "metadata", "groups", "contents", "implicitTiling")
 
@@ -47,22 +47,21 @@ _CONTENT = {"uri": str, "url": str}
 _TILE: dict[str, Any] = {"content": _CONTENT, "contents": [_CONTENT]}
 _TILE["children"] = [_TILE]
 
-TILESET = {"asset": dict, "root": Needed(_TILE), "groups": list, "extensionsRequired": [str]}
-"""What is taken for granted of a tileset; numbers are checked one by one, as what is wrong with them is worth a
-finding."""
+TILESET = {"asset": dict, "root": Required(_TILE), "groups": list, "extensionsRequired": [str]}
+"""Shape of the used members of a tileset; numbers are checked individually, as each problem is a finding of its own."""
 
 
 def check_tileset(path: Path, external: bool = True) -> list[Finding]:
-    """Findings about a tileset and all it refers to.
+    """Check a tileset and everything it refers to.
 
     path : the tileset.json or its folder; external : as for `check_gltf`
     """
     path = path / "tileset.json" if path.is_dir() else path
-    return list(_check_file(path, external, _Above(np.eye(4), (), math.inf, False), frozenset(), Counter()))
+    return list(_check_file(path, external, _Inherited(np.eye(4), (), math.inf, False), frozenset(), Counter()))
 
 
 def read_tileset(path: Path) -> dict[str, Any]:
-    """The document of a tileset. Raises ExportError for a file that is not there or no tileset."""
+    """Read the document of a tileset. Raises ExportError for a file that is missing or not a tileset."""
     remedy = "give a tileset.json of 3D Tiles"
     document: dict[str, Any] = read_json(path, remedy, ExportError)
     if not isinstance(document, dict) or not isinstance(document.get("root"), dict):
@@ -75,8 +74,8 @@ def read_tileset(path: Path) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class _Above:
-    """What a tile has from those above it: their transform and volumes, the last one's error, if it was ever turned."""
+class _Inherited:
+    """State inherited by a tile: transform, volumes, error of the parent, and whether any ancestor has a transform."""
 
     matrix: Matrix
     volumes: tuple[Volume, ...]
@@ -85,7 +84,7 @@ class _Above:
 
 
 def _check_file(
-    path: Path, external: bool, above: _Above, chain: frozenset[Path], looks: Counter[Path]
+    path: Path, external: bool, above: _Inherited, chain: frozenset[Path], visits: Counter[Path]
 ) -> Iterator[Finding]:
     name = path.name
     if path.resolve() in chain:
@@ -107,53 +106,53 @@ def _check_file(
     if document["root"].get("refine") not in ("ADD", "REPLACE"):
         yield Finding("error", "REFINE", "the root tile needs refine ADD or REPLACE", f"{name}: root")
     for extension in document.get("extensionsRequired", []):
-        yield Finding("info", "NOT_CHECKED", f"extension {extension} is not looked into", name)
+        yield Finding("info", "NOT_CHECKED", f"extension {extension} is not checked", name)
     schema, findings = read_schema(document, path)
     yield from findings
     if "metadata" in document:
         yield from check_entity(document["metadata"], schema, name)
     for index, group in enumerate(document.get("groups", [])):
         yield from check_entity(group, schema, f"{name}: groups/{index}")
-    ours = asset.get("generator") == "fig2mesh"
+    own = asset.get("generator") == "fig2mesh"
     up_axis = str(asset.get("gltfUpAxis", "Y")).upper()
-    walk = _Walk(path, external, chain | {path.resolve()}, looks, schema, version == "1.0", ours, up_axis)
+    walk = _Walk(path, external, chain | {path.resolve()}, visits, schema, version == "1.0", own, up_axis)
     yield from walk.too_new(document, name)
     yield from walk.tile(document["root"], replace(above, error=min(error, above.error)), f"{name}: root")
 
 
 @dataclass(frozen=True)
 class _Walk:
-    """One tileset file: where it is, how often each file was looked into, what its tiles are checked against."""
+    """Traversal of one tileset file: its path, visits of each file, and options of the checks of its tiles."""
 
     path: Path
     external: bool
     chain: frozenset[Path]
-    looks: Counter[Path]
+    visits: Counter[Path]
     schema: dict[str, Any] | None
     old: bool
-    ours: bool
+    own: bool
     up_axis: str
 
     def too_new(self, item: dict[str, Any], where: str) -> Iterator[Finding]:
         if self.old:
             for key in SINCE_1_1:
                 if key in item:
-                    yield Finding("warning", "VERSION_1_1", f"{key} is not of version 1.0", where)
+                    yield Finding("warning", "VERSION_1_1", f"{key} does not exist in version 1.0", where)
 
-    def tile(self, tile: dict[str, Any], above: _Above, where: str) -> Iterator[Finding]:
+    def tile(self, tile: dict[str, Any], above: _Inherited, where: str) -> Iterator[Finding]:
         local, problem, unusual = read_transform(tile.get("transform"))
         if problem:
             yield Finding("error", "TRANSFORM", problem, where)
             return
         if unusual:
-            yield Finding("error" if self.ours else "warning", "TRANSFORM", unusual, where)
+            yield Finding("error" if self.own else "warning", "TRANSFORM", unusual, where)
         matrix = above.matrix @ local
         error = _geometric_error(tile)
         if error is None:
             yield Finding("error", "GEOMETRIC_ERROR", "the tile needs a geometricError of 0 or more", where)
             error = above.error
         elif error > above.error:
-            message = f"geometricError {error:g} is larger than {above.error:g} of what it refines"
+            message = f"geometricError {error:g} is larger than {above.error:g} of its parent"
             yield Finding("error", "GEOMETRIC_ERROR", message, where)
         elif tile.get("children") and error == 0:
             yield Finding("warning", "NEVER_REFINED", "geometricError 0: viewers never load the children", where)
@@ -167,20 +166,20 @@ class _Walk:
         else:
             volume = Volume(tile["boundingVolume"], matrix, where)
             with _measuring():
-                out = volumes[-1].holds(volume) if volumes else 0.0
-            if out > CHILD_TOLERANCE_M:
-                # Legal, as only content has to be inside; ours keep to more.
-                severity: Severity = "warning" if self.ours else "info"
-                yield Finding(severity, "CHILD_VOLUME", f"reaches {out:.3g} m out of its parent's volume", where)
+                excess = volumes[-1].excess_of(volume) if volumes else 0.0
+            if excess > CHILD_TOLERANCE_M:
+                # Legal, as only content has to be inside; fig2mesh guarantees more.
+                severity: Severity = "warning" if self.own else "info"
+                yield Finding(severity, "CHILD_VOLUME", f"reaches {excess:.3g} m out of its parent's volume", where)
             volumes = (*volumes, volume)
-        here = _Above(matrix, volumes, error, above.placed or "transform" in tile)
+        here = _Inherited(matrix, volumes, error, above.placed or "transform" in tile)
         yield from self.contents(tile, here, where)
         for index, child in enumerate(tile.get("children", [])):
             yield from self.tile(child, here, f"{where}/children/{index}")
 
-    def contents(self, tile: dict[str, Any], here: _Above, where: str) -> Iterator[Finding]:
+    def contents(self, tile: dict[str, Any], here: _Inherited, where: str) -> Iterator[Finding]:
         if "implicitTiling" in tile:
-            yield Finding("info", "NOT_CHECKED", "implicit tiling: its subtrees are not looked into", where)
+            yield Finding("info", "NOT_CHECKED", "implicit tiling: its subtrees are not checked", where)
             return
         for content in [tile["content"]] if "content" in tile else tile.get("contents", []):
             inner = here
@@ -192,32 +191,32 @@ class _Walk:
                     inner = replace(here, volumes=(*here.volumes, volume))
             if "metadata" in content:
                 yield from check_entity(content["metadata"], self.schema, f"{where}: content")
-            # Before 1.0 was final, and in old exports since, the name was url.
+            # Drafts of 1.0 and some old exporters use url.
             yield from self.content(str(content.get("uri", content.get("url", ""))), inner, where)
 
-    def content(self, uri: str, here: _Above, where: str) -> Iterator[Finding]:
+    def content(self, uri: str, here: _Inherited, where: str) -> Iterator[Finding]:
         if uri.startswith(("http:", "https:", "data:", "//")):
-            yield Finding("info", "NOT_CHECKED", f"content {uri[:60]} is elsewhere", where)
+            yield Finding("info", "NOT_CHECKED", f"content {uri[:60]} is remote and not checked", where)
             return
         file = self.path.parent / unquote(uri)
-        if not is_there(file):
+        if not is_plain_file(file):
             file = self.path.parent / unquote(uri.partition("?")[0].partition("#")[0])
-        if not uri or not is_there(file):
-            yield Finding("error", "CONTENT", f"content {uri!r} is not there", where)
+        if not uri or not is_plain_file(file):
+            yield Finding("error", "CONTENT", f"content {uri!r} not found", where)
             return
-        self.looks[file.resolve()] += 1
-        if (count := self.looks[file.resolve()]) > MAX_SAME_FILE:
-            if count == MAX_SAME_FILE + 1:
-                message = f"{uri}: named more than {MAX_SAME_FILE} times, the others are not looked into"
+        self.visits[file.resolve()] += 1
+        if (count := self.visits[file.resolve()]) > MAX_VISITS_PER_FILE:
+            if count == MAX_VISITS_PER_FILE + 1:
+                message = f"{uri}: referred to more than {MAX_VISITS_PER_FILE} times, the others are not checked"
                 yield Finding("info", "NOT_CHECKED", message, where)
             return
         content = read_content(file, self.external, self.up_axis)
         if content.kind == "tileset":
-            yield from _check_file(file, self.external, here, self.chain, self.looks)
+            yield from _check_file(file, self.external, here, self.chain, self.visits)
             return
         yield from content.findings
         if self.old and file.suffix.lower() in (".glb", ".gltf"):
-            yield Finding("warning", "VERSION_1_1", "glTF is no content of version 1.0", where)
+            yield Finding("warning", "VERSION_1_1", "glTF is not a content type of version 1.0", where)
         if content.points is not None and len(content.points):
             for volume in here.volumes:
                 with _measuring():
@@ -228,28 +227,28 @@ class _Walk:
         yield from _check_place(content, here, f"{where}: {uri}")
 
 
-def _check_place(content: Content, here: _Above, where: str) -> Iterator[Finding]:
-    """A figure's place by the transforms above it against the one that its file records."""
+def _check_place(content: Content, here: _Inherited, where: str) -> Iterator[Finding]:
+    """Compare the place of a figure by the transforms above it with the one recorded in its file."""
     if content.georeference is None:
         return
     try:
-        wanted = ecef_from_tile(placement_of_record(content.georeference)).matrix
+        expected = ecef_from_tile(placement_of_record(content.georeference)).matrix
     except (DamagedFile, PlacementError) as error:
         yield Finding("warning", "PLACE", str(error), where)
         return
-    away = float(np.linalg.norm(here.matrix[:3, 3] - wanted[:3, 3]))
-    # Of the whole rotation, as bearings mean nothing at the poles: sin(angle / 2) from the largest difference.
-    gap = float(np.linalg.norm(here.matrix[:3, :3] - wanted[:3, :3])) / math.sqrt(8)
+    away = float(np.linalg.norm(here.matrix[:3, 3] - expected[:3, 3]))
+    # From the whole rotation, as bearings are undefined at the poles: sin(angle / 2) from the largest difference.
+    gap = float(np.linalg.norm(here.matrix[:3, :3] - expected[:3, :3])) / math.sqrt(8)
     turn = math.degrees(2 * math.asin(min(gap, 1.0)))
     if not here.placed:
-        yield Finding("error", "PLACE", "no transform takes it to the place that its file records", where)
+        yield Finding("error", "PLACE", "no transform to the place recorded in its file", where)
     elif away > PLACE_TOLERANCE_M or turn > TURN_TOLERANCE_DEG:
-        message = f"{away:.3g} m and {turn:.3g} degrees from the place that its file records"
+        message = f"{away:.3g} m and {turn:.3g} degrees from the place recorded in its file"
         yield Finding("error", "PLACE", message, where)
 
 
 def _measuring() -> AbstractContextManager[None]:
-    return decoding("a volume of numbers that are too large", PlacementError, np.linalg.LinAlgError)
+    return decoding("a volume with too large numbers", PlacementError, np.linalg.LinAlgError)
 
 
 def _geometric_error(item: dict[str, Any]) -> float | None:

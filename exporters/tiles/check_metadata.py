@@ -1,4 +1,4 @@
-"""Metadata of 3D Tiles against their schema.
+"""Checks of metadata of 3D Tiles against their schema.
 
 https://github.com/CesiumGS/3d-tiles/tree/main/specification/Metadata
 """
@@ -16,27 +16,27 @@ from exporters.errors import ExportError
 from exporters.findings import Finding
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import read_json
-from georef.untrusted.json_shape import WHOLE, Needed, Values, check_shape
+from georef.untrusted.json_shape import INDEX, Required, Values, check_shape
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 
-_PROPERTY = {"type": str, "componentType": str, "array": bool, "count": WHOLE, "required": bool, "enumType": str}
+_PROPERTY = {"type": str, "componentType": str, "array": bool, "count": INDEX, "required": bool, "enumType": str}
 
 SCHEMA = {
     "classes": Values({"properties": Values(_PROPERTY)}),
     "enums": Values({"values": [{"name": str}]}),
 }
-"""What is taken for granted of a schema."""
+"""Shape of the used members of a schema."""
 
 
 def read_schema(document: dict[str, Any], path: Path) -> tuple[dict[str, Any] | None, list[Finding]]:
-    """The schema of a tileset or the file it names, None without one, and findings about it."""
+    """Read the schema of a tileset, embedded or in a file, None without one, and check it."""
     name = path.name
     schema = document.get("schema")
     if schema is None and "schemaUri" in document:
         uri = str(document["schemaUri"])
         if "://" in uri:
-            return None, [Finding("info", "NOT_CHECKED", f"the schema {uri} is elsewhere", name)]
+            return None, [Finding("info", "NOT_CHECKED", f"the schema {uri} is remote and not checked", name)]
         try:
             schema = read_json(path.parent / unquote(uri), "write it again", ExportError)
         except ExportError as error:
@@ -51,12 +51,12 @@ def read_schema(document: dict[str, Any], path: Path) -> tuple[dict[str, Any] | 
 
 
 def check_entity(entity: Any, schema: dict[str, Any] | None, where: str) -> Iterator[Finding]:
-    """Findings about the metadata of a tileset, tile, group or content.
+    """Check the metadata of a tileset, tile, group or content.
 
     entity : {"class", "properties"}; schema : that of its tileset, None if it has none
     """
     try:
-        check_shape(entity, {"class": Needed(str), "properties": dict}, "metadata")
+        check_shape(entity, {"class": Required(str), "properties": dict}, "metadata")
     except DamagedFile as error:
         yield Finding("error", "METADATA", str(error), where)
         return
@@ -68,13 +68,13 @@ def check_entity(entity: Any, schema: dict[str, Any] | None, where: str) -> Iter
     kinds, values = found.get("properties", {}), entity.get("properties", {})
     for key, kind in kinds.items():
         if kind.get("required") and key not in values:
-            yield Finding("error", "METADATA", f"{key}, which class {name} requires, is missing", where)
+            yield Finding("error", "METADATA", f"required property {key} of class {name} is missing", where)
     for key, value in values.items():
         if key not in kinds:
             yield Finding("error", "METADATA", f"{key} is not in class {name}", where)
         elif not _fits_property(value, kinds[key], (schema or {}).get("enums", {})):
             text = json.dumps(value, ensure_ascii=False)[:60]
-            yield Finding("error", "METADATA_TYPE", f"{key}: {text} is no {_named(kinds[key])}", where)
+            yield Finding("error", "METADATA_TYPE", f"{key}: {text} is not of type {_named(kinds[key])}", where)
 
 
 def _named(kind: dict[str, Any]) -> str:

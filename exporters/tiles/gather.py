@@ -1,4 +1,4 @@
-"""A folder with one tileset of many figures: their contents, the tree, a map of them, and entities for terrain."""
+"""Writer of a tileset of many figures: contents, tile tree, GeoJSON index, and CZML entities for terrain."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from exporters.write import OutputPath, check_file
 CONTENT_FOLDER = "figures"
 INDEX, ENTITIES = "index.geojson", "figures.czml"
 
-LONGEST_NAME = 60
-"""Characters of a file name; file systems allow 255 bytes, and a character takes up to four."""
+MAX_NAME_CHARACTERS = 60
+"""Limit of the characters of a file name; file systems allow 255 bytes, and a character takes up to four."""
 
 
 @dataclass(frozen=True)
-class Written:
-    """What `write_figures` has written.
+class WrittenTileset:
+    """Result of `write_figures`.
 
     figures : their number; tallest_m : height of the tallest one; files : the tileset.json last
     """
@@ -52,20 +52,20 @@ def write_figures(
     version: TilesVersion = "1.1",
     overwrite: bool = False,
     link: bool = False,
-) -> Written:
-    """Gather figures from files into one tileset, whole or not at all.
+) -> WrittenTileset:
+    """Collect figures from files into one tileset, which is written atomically.
 
-    sources : as for `exporters.figure_reader.read_figures`; a file that is met twice is one figure
-    folder : the tileset's, or its tileset.json; missing folders are made, foreign files in it are kept
+    sources : as for `exporters.figure_reader.read_figures`; duplicate files count once
+    folder : of the tileset, or its tileset.json; missing folders are created, unrelated files in it are kept
     visible_from_m, version : see `exporters.tiles.tileset.write_tileset`
-    overwrite : replace what is there; what a tileset of figures that was there before named and this one does not, goes
-    link : give contents of version 1.1 a second name (hard link) instead of copying them, where the disk allows it
+    overwrite : replace existing files; files of an earlier tileset of figures there that are not replaced are removed
+    link : hard-link contents of version 1.1 instead of copying them, where the file system allows it
 
-    Content goes to `figures/`, under names of its own: two figures of the same name get different ones. Beside the
-    tileset are `index.geojson` and, in version 1.1, `figures.czml`. The same figures in another order give the same
-    bytes. Memory: about 5 kB per figure; no mesh is loaded whole but for the conversion to version 1.0.
+    Content goes to `figures/`, under unique names. Next to the tileset are `index.geojson` and, in version 1.1,
+    `figures.czml`. The same figures in another order give the same bytes. Memory: about 5 kB per figure; whole meshes
+    are loaded only for the conversion to version 1.0.
 
-    Raises ExportError where a source has no place or no figure, and where the disk refuses.
+    Raises ExportError where a source has no place or no figure, and where a file cannot be written.
     """
     check_distance(visible_from_m)
     main = Path(folder) if Path(folder).name == "tileset.json" else Path(folder) / "tileset.json"
@@ -84,7 +84,7 @@ def write_figures(
 
     outdated = list(_own_files(main)) if overwrite and main.is_file() else []
     tallest_m = max(figure.placement.figure_height_m for figure in figures)
-    return Written(len(figures), tallest_m, write_whole(folder, main, fill, overwrite, outdated))
+    return WrittenTileset(len(figures), tallest_m, write_whole(folder, main, fill, overwrite, outdated))
 
 
 def write_tree(
@@ -95,11 +95,11 @@ def write_tree(
     version: TilesVersion = "1.1",
     name: str = "tileset.json",
 ) -> None:
-    """Write the tileset, and `index.geojson` and `figures.czml`, over figures whose contents are there already.
+    """Write the tileset, `index.geojson` and `figures.czml` for figures whose contents exist already.
 
-    figures : at least one, in an order that does not change from run to run; `contents` as seen from the folder
-    folder : has to be there; files of the same names are replaced, so let `exporters.atomic_file.write_whole` give it
-    name : of the tileset file to open
+    figures : at least one, in a reproducible order; `contents` relative to the folder
+    folder : must exist; files of the same names are replaced, so use one from `exporters.atomic_file.write_whole`
+    name : of the root tileset file
     """
     glb = version == "1.1"
     with (folder / INDEX).open("w", encoding="utf-8", newline="\n") as stream:
@@ -120,14 +120,14 @@ def _gather(sources: Iterable[Path]) -> list[PlacedFigure]:
             found.setdefault(figure.contents, figure)
             empty = False
         if empty:
-            raise ExportError(source, "holds no figure", "give .glb files, tilesets or folders of them")
+            raise ExportError(source, "contains no figure", "give .glb files, tilesets or folders of them")
     if not found:
-        raise ExportError("tileset", "no figure is given", "name .glb files, tilesets or folders of them")
+        raise ExportError("tileset", "no figure given", "give .glb files, tilesets or folders of them")
     return list(found.values())
 
 
 def _in_order(figures: list[PlacedFigure]) -> list[PlacedFigure]:
-    """In an order that depends on nothing but the figures themselves: name, place, what else is said, content."""
+    """Sort figures independently of their input order: by name, then place and other facts, then content."""
     ordered: list[PlacedFigure] = []
     by_text = sorted(((figure.name, describe(figure), figure) for figure in figures), key=lambda each: each[:2])
     for _, group in groupby(by_text, key=lambda each: each[:2]):
@@ -141,17 +141,17 @@ def _digest(figure: PlacedFigure) -> list[str]:
 
 
 def _named(figures: list[PlacedFigure], suffix: str) -> list[tuple[PlacedFigure, PlacedFigure]]:
-    """Each figure with a copy whose contents have the names that they are to have below the folder."""
+    """Pair each figure with a copy whose contents have their new names in the folder."""
     taken: set[str] = set()
     numbers: dict[str, int] = {}
     pairs = []
     for figure in figures:
-        stem = safe_name(figure.name)[:LONGEST_NAME]
+        stem = safe_name(figure.name)[:MAX_NAME_CHARACTERS]
         while True:
             number = numbers[stem] = numbers.get(stem, 0) + 1
             base = stem if number == 1 else f"{stem}_{number}"
             names = [base + (f"_lod{lod}" if lod else "") + suffix for lod in range(len(figure.contents))]
-            # Some file systems take Anna and anna for the same file.
+            # On case-insensitive file systems Anna and anna are the same file.
             if not any(name.casefold() in taken for name in names):
                 break
         taken.update(name.casefold() for name in names)
@@ -168,7 +168,7 @@ def _content(source: Path, target: Path, version: TilesVersion, link: bool) -> N
             os.link(source, target)
             return
         except OSError:
-            pass  # another disk, or one that has no links
+            pass  # another file system, or one without hard links
     shutil.copyfile(source, target)
 
 
@@ -176,11 +176,11 @@ def _check_free(folder: Path, figures: list[PlacedFigure]) -> None:
     names = [INDEX, ENTITIES, *(content for figure in figures for content in figure.contents)]
     for name in names:
         if (folder / name).exists():
-            raise ExportError(folder / name, "exists already", "use --overwrite or choose another folder")
+            raise ExportError(folder / name, "already exists", "use --overwrite or choose another folder")
 
 
 def _own_files(main: Path) -> Iterator[str]:
-    """Files beside an earlier tileset of figures, as seen from it, that it names and that are ours to take away."""
+    """Files of an earlier tileset of figures by fig2mesh, relative to it, which may be removed."""
     try:
         document = read_tileset(main)
     except ExportError:

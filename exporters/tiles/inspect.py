@@ -1,4 +1,4 @@
-"""What is in a tileset: of one figure with its levels of detail, or of many."""
+"""Facts about tilesets of one figure with its levels of detail, or of many."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from exporters.georeference import placement_of_tile
 from exporters.gltf.inspect import gltf_facts
 from exporters.tiles.check import read_tileset
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.json_shape import NUMBER, Needed, check_shape
+from georef.untrusted.json_shape import NUMBER, Required, check_shape
 
 
 def tileset_facts(path: Path) -> dict[str, Any]:
-    """Facts about a tileset.json; see `exporters.inspect.inspect`."""
+    """Return facts about a tileset.json; see `exporters.inspect.inspect`."""
     document = read_tileset(path)
     if (collection := _collection_facts(document, path)) is not None:
         return collection
@@ -25,7 +25,7 @@ def tileset_facts(path: Path) -> dict[str, Any]:
     while tile is not None:
         uri = tile.get("content", {}).get("uri")
         if uri and uri.lower().endswith((".glb", ".gltf")):
-            check_shape(tile, {"geometricError": Needed(NUMBER)}, f"tile of {uri[:40]}")
+            check_shape(tile, {"geometricError": Required(NUMBER)}, f"tile of {uri[:40]}")
             lods.append({"uri": uri, "geometric_error_m": tile["geometricError"]})
         children = tile.get("children", [])
         tile = children[0] if len(children) == 1 else None
@@ -41,17 +41,17 @@ def tileset_facts(path: Path) -> dict[str, Any]:
         extras = document.get("asset", {}).get("extras")
         recorded = extras.get("georeference") if isinstance(extras, dict) else None
         try:
-            # What the transform does is the truth; the record beside it adds what no matrix can hold.
+            # The transform takes precedence; the record adds values that a matrix does not contain.
             place = placement_of_tile(document["root"]["transform"])
         except DamagedFile as error:
-            raise ExportError(path, f"broken transform ({error})", "see validate") from error
+            raise ExportError(path, f"invalid transform ({error})", "run fig2mesh validate") from error
         placement = (recorded if isinstance(recorded, dict) else {}) | place
     # The chain runs from coarse to fine: `inside` is the finest.
     return inside | facts | {"placement": placement, "lods": lods[::-1]}
 
 
 def _collection_facts(document: dict[str, Any], path: Path) -> dict[str, Any] | None:
-    """Facts about a tileset of many figures that fig2mesh wrote; None for other tilesets."""
+    """Return facts about a tileset of many figures by fig2mesh; None for other tilesets."""
     asset, root = document.get("asset", {}), document["root"]
     if asset.get("generator") != "fig2mesh" or "transform" in root:
         return None

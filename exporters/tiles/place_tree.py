@@ -1,11 +1,11 @@
-"""A balanced tree over places on the earth, each node with an oriented box round all that is below it.
+"""Balanced tree over places on the earth, each node with an oriented bounding box of all its descendants.
 
 Sort-tile-recursive packing (Leutenegger, Lopez, Edgington 1997) on earth-centred coordinates: the figures of a node
-are cut at ranks, across their longest extent, until there are enough groups, all full. Poles and antimeridian are
-places like any other there, and no number of figures at one place makes the tree deeper.
+are split by rank along their longest extent into enough groups, all full. Poles and antimeridian need no special
+cases, and many figures at one place do not make the tree deeper.
 
-Boxes lie flat on the earth where they are: a sphere round figures 100 km apart would reach 50 km up, and a viewer at
-that height would visit all of it. As a box holds the corners of the boxes below, it holds the bulge of the earth.
+Boxes are aligned to the local horizon: a sphere around figures 100 km apart would reach 50 km up, and a viewer at that
+height would visit all of it. As a box contains the corners of its children's boxes, it contains the bulge of the earth.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from georef.geodesy import enu_at, geodetic_from_ecef
 from georef.placement import GeoPlacement
 
 BRANCHES = 8
-"""Largest number of children of a node, and of figures of a leaf."""
+"""Maximum number of children of a node, and of figures of a leaf."""
 
-DEEP_M = 1e6
-"""Where the mean of the figures is no farther from the earth's centre than this, no side of the box is up."""
+MIN_RADIUS_M = 1e6
+"""Threshold of the mean's distance from the earth's centre; below it, the box is aligned to the axes of ECEF."""
 
 Floats = NDArray[np.float64]
 
@@ -37,9 +37,9 @@ SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 class PlaceNode:
     """A node of the tree.
 
-    box : centre and three half axes, ECEF, metres, as 3D Tiles write them; holds all boxes of nodes and figures below
-    count : how many figures are below
-    depth : how many nodes lie on the longest way down, 1 for a leaf
+    box : centre and three half axes, ECEF, metres, as in 3D Tiles; contains the boxes of all descendants
+    count : number of figures below
+    depth : number of nodes on the longest path down, 1 for a leaf
     children : of an inner node, at least two; empty for a leaf
     figures : indices of a leaf's figures; empty for an inner node
     """
@@ -60,7 +60,7 @@ def figure_corners(placement: GeoPlacement, low: ArrayLike, high: ArrayLike) -> 
 
 
 def figure_box(placement: GeoPlacement, low: ArrayLike, high: ArrayLike) -> tuple[float, ...]:
-    """A figure's box with its margin, as 3D Tiles write boxes in ECEF; low, high : as for `figure_corners`."""
+    """Return a figure's box with its margin, as 3D Tiles write boxes in ECEF; low, high : as for `figure_corners`."""
     bottom, top = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
     matrix = ecef_matrix(placement)
     centre = matrix[:3, :3] @ ((bottom + top) / 2) + matrix[:3, 3]
@@ -69,11 +69,11 @@ def figure_box(placement: GeoPlacement, low: ArrayLike, high: ArrayLike) -> tupl
 
 
 def place_tree(corners: Floats) -> PlaceNode:
-    """The tree over figures.
+    """Build the tree over figures.
 
     corners : (N, 8, 3) float64, N >= 1, ECEF, metres; order matters only among figures with equal centres
 
-    Its depth is the least that nodes of 8 allow: ceil(log8 N), at least 1.
+    Its depth is minimal for 8 children per node: ceil(log8 N), at least 1.
     """
     corners = np.asarray(corners, dtype=np.float64)
     return _node(np.arange(len(corners)), corners, corners.mean(axis=1))
@@ -87,23 +87,23 @@ def _node(indices: NDArray[np.int64], corners: Floats, centres: Floats) -> Place
     capacity = BRANCHES
     while capacity * BRANCHES < count:
         capacity *= BRANCHES
-    groups = _cut(indices, centres, -(-count // capacity))
+    groups = _split(indices, centres, -(-count // capacity))
     children = tuple(_node(group, corners, centres) for group in groups)
     box = enclosing_box(np.concatenate([box_corners(child.box) for child in children]))
     return PlaceNode(box, count, 1 + max(child.depth for child in children), children)
 
 
-def _cut(indices: NDArray[np.int64], centres: Floats, groups: int) -> list[NDArray[np.int64]]:
-    """That many groups of neighbours of nearly equal size."""
+def _split(indices: NDArray[np.int64], centres: Floats, groups: int) -> list[NDArray[np.int64]]:
+    """Split indices into groups of neighbours of nearly equal size."""
     if groups == 1:
         return [indices]
     own = centres[indices]
     axis = int(np.argmax(np.ptp(own, axis=0)))
     order = indices[np.argsort(own[:, axis], kind="stable")]
     left = groups // 2
-    # Rounded up, or the groups on the right could be one too large for what a node holds.
-    place = -(-len(indices) * left // groups)
-    return _cut(order[:place], centres, left) + _cut(order[place:], centres, groups - left)
+    # Rounded up, or the groups on the right could exceed the capacity of a node by one.
+    split = -(-len(indices) * left // groups)
+    return _split(order[:split], centres, left) + _split(order[split:], centres, groups - left)
 
 
 def box_corners(box: ArrayLike) -> Floats:
@@ -113,15 +113,15 @@ def box_corners(box: ArrayLike) -> Floats:
 
 
 def enclosing_box(points: Floats) -> tuple[float, ...]:
-    """A box round points, two of its axes level where the points are.
+    """Return a bounding box of points, aligned to east, north and up at their mean.
 
     points : (N, 3) float64, N >= 1, ECEF, metres
     returns : 12 numbers, centre (whole millimetres) and half axes east, north and up, each at least 1 mm longer than
-        needed: float64 at the size of the earth is good to 1e-9 m
+        necessary: float64 ECEF coordinates are accurate to 1e-9 m
     """
     mean = points.mean(axis=0)
     axes = np.eye(3)
-    if np.linalg.norm(mean) > DEEP_M:
+    if np.linalg.norm(mean) > MIN_RADIUS_M:
         lon, lat, _ = geodetic_from_ecef(mean).tolist()
         axes = enu_at(lon, lat).matrix[:3, :3]
     local = (points - mean) @ axes

@@ -1,13 +1,12 @@
-"""3D Tiles of many figures: an explicit tree by place, in as many tileset files as keep each of them small.
+"""3D Tiles of many figures: an explicit spatial tree, split into small tileset files.
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html
 
-Inner tiles have no content, only a box in ECEF round everything below. Their geometric error is the largest of those
-of the figures below, whose ranges are the distances that these are drawn from, and they refine by ADD: then CesiumJS
-tests each child's own distance against the error of its parent, and what lies farther away is neither visited nor
-loaded. A figure with a smaller range than others in its leaf has an inner tile of its own between, so that every figure
-is drawn from just as far as if it had a tileset of its own. Larger errors higher up would gain nothing, since a box is
-never farther away than what it holds.
+Inner tiles have no content, only a box in ECEF around all descendants. Their geometric error is the largest error of
+the figures below, which sets their visible range, and they refine by ADD: then CesiumJS tests each child's own distance
+against the error of its parent, and farther tiles are neither visited nor loaded. A figure with a smaller range than
+others in its leaf gets an inner tile of its own in between, so that every figure is drawn up to the same distance as in
+a tileset of its own. Larger errors higher up would gain nothing, since a box is never farther away than its contents.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from exporters.tiles.place_tree import PlaceNode, figure_box, figure_corners, pl
 from exporters.tiles.tileset import TilesVersion, check_distance, figure_tile, visible_error
 
 FIGURES_PER_FILE = 512
-"""Largest number of figures in one tileset file, about 0.5 MB, and of further files that one refers to."""
+"""Maximum number of figures in one tileset file, about 0.5 MB, and of further files that it refers to."""
 
 
 def _property(kind: str, description: str, required: bool = False, **more: Any) -> dict[str, Any]:
@@ -62,11 +61,11 @@ SCHEMA: dict[str, Any] = {
         },
     },
 }
-"""Schema of the metadata; the same in every file, as CesiumJS looks into that of the first one only."""
+"""Schema of the metadata; the same in every file, as CesiumJS uses only that of the first one."""
 
 
 def figure_properties(figure: PlacedFigure) -> dict[str, Any]:
-    """The values of class `figure` in `SCHEMA`; what is unknown is left out."""
+    """Return the values of class `figure` in `SCHEMA`, without unknown ones."""
     place = figure.placement
     values: dict[str, Any] = {
         "name": figure.name,
@@ -93,7 +92,7 @@ class _Writer:
     digits: int
 
     def documents(self, node: PlaceNode, name: str, numbers: Iterator[int]) -> Iterator[tuple[str, dict[str, Any]]]:
-        """The file that begins at a node, after those that it refers to."""
+        """Generate the file whose root is a node, after those that it refers to."""
         limit = FIGURES_PER_FILE
         while limit * FIGURES_PER_FILE < node.count:
             limit *= FIGURES_PER_FILE
@@ -123,12 +122,12 @@ class _Writer:
         return tile | {"children": inner + [self.leaf(index, error) for index in node.figures]}
 
     def error(self, node: PlaceNode) -> float:
-        """Largest error of the figures below a node."""
+        """Return the largest error of the figures below a node."""
         below = [self.error(child) for child in node.children]
         return max(below + [self.errors[index] for index in node.figures])
 
     def leaf(self, index: int, above: float) -> dict[str, Any]:
-        """The tile of a figure; in one that shortens its range where the error above it is larger than its own."""
+        """Return the tile of a figure, inside one that limits its range if the error above is larger than its own."""
         figure, error = self.figures[index], self.errors[index]
         tile = figure_tile(figure, self.facts(figure))
         if error >= above:
@@ -140,7 +139,7 @@ class _Writer:
         properties = figure_properties(figure)
         if self.version == "1.0":
             return {"extras": properties}
-        # On every level of detail: CesiumJS's getPropertyInherited looks at a content's own tile, not above it.
+        # On every level of detail: CesiumJS's getPropertyInherited uses only a content's own tile, not its parents.
         return {"metadata": {"class": "figure", "properties": properties}}
 
 
@@ -154,14 +153,14 @@ def tileset_documents(
     version: TilesVersion = "1.1",
     name: str = "tileset.json",
 ) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The tileset files of figures, one after the other: file name and document, the one to open last.
+    """Generate the tileset files of figures: file name and document, the root file last.
 
-    figures : at least one; `contents` as seen from the folder of the files. Their order decides the order of tiles
-        only among figures at equal coordinates
-    visible_from_m : distance from which a figure is drawn at all, on a screen of 1080 rows; None: of each figure,
+    figures : at least one; `contents` relative to the folder of the files. Their order affects the order of tiles only
+        among figures at equal coordinates
+    visible_from_m : distance up to which a figure is drawn, on a screen of 1080 rows; None: of each figure,
         `exporters.tiles.tileset.visible_range` of its height
-    version : of 3D Tiles; 1.0 has no metadata, so its tiles tell the same in `extras`
-    name : of the file to open; further ones are called after it
+    version : of 3D Tiles; 1.0 has no metadata, so its tiles have the same values in `extras`
+    name : of the root file, from which the names of further files are derived
 
     Raises ExportError for a distance that is not positive.
     """

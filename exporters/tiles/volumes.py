@@ -1,4 +1,4 @@
-"""Transforms and bounding volumes of 3D Tiles: are they well formed, and what lies outside of them.
+"""Transforms and bounding volumes of 3D Tiles: validation, and distances of points outside them.
 
 https://docs.ogc.org/cs/22-025r4/22-025r4.html#core-bounding-volumes
 """
@@ -26,9 +26,9 @@ Points = NDArray[np.float64]
 class Volume:
     """A bounding volume.
 
-    volume : as in a tileset, without faults
-    matrix : (4, 4), takes its frame to the frame of the whole tileset, which is ECEF for regions
-    where : the tile it belongs to
+    volume : as in a tileset, valid
+    matrix : (4, 4), from its frame to the frame of the whole tileset, which is ECEF for regions
+    where : its tile, for messages
     """
 
     volume: dict[str, Any]
@@ -36,17 +36,17 @@ class Volume:
     where: str
 
     def outside(self, points: Points, matrix: Matrix) -> float:
-        """How far, in metres, the farthest of (N, 3) points lies outside, negative inside; matrix : of the points."""
+        """Return the largest distance, metres, of (N, 3) points outside, negative inside; matrix : of the points."""
         if "region" in self.volume:
             return _outside_region(self.volume["region"], points @ matrix[:3, :3].T + matrix[:3, 3])
-        # Into the volume's own frame before anything is compared: ECEF coordinates would cost eight digits.
+        # Computed in the volume's own frame: ECEF coordinates would lose eight digits.
         inner = np.linalg.inv(self.matrix) @ matrix
         local = points @ inner[:3, :3].T + inner[:3, 3]
         distance = _outside_box if "box" in self.volume else _outside_sphere
         return distance(self.volume, local) * scale_of(self.matrix)
 
-    def holds(self, inner: Volume) -> float:
-        """How far, in metres, another volume reaches out of this one, negative where it does not."""
+    def excess_of(self, inner: Volume) -> float:
+        """Return the distance, metres, by which another volume reaches out of this one, negative if it does not."""
         if "sphere" in inner.volume and "region" not in self.volume:
             sphere = np.asarray(inner.volume["sphere"], dtype=np.float64)
             return self.outside(sphere[None, :3], inner.matrix) + float(sphere[3]) * scale_of(inner.matrix)
@@ -56,30 +56,30 @@ class Volume:
 
 
 def scale_of(matrix: Matrix) -> float:
-    """The largest factor by which a matrix lengthens an axis."""
+    """Return the largest scale factor of a matrix along an axis."""
     return float(np.linalg.norm(matrix[:3, :3], axis=0).max())
 
 
 def read_transform(values: Any) -> tuple[Matrix, str, str]:
-    """A tile's transform: the matrix, what makes it unusable ("" if nothing), and what makes it unusual ("")."""
+    """Read a tile's transform: the matrix, a problem that makes it unusable or "", and an unusual property or ""."""
     if values is None:
         return np.eye(4), "", ""
-    if not numbers(values, 16):
+    if not is_number_list(values, 16):
         return np.eye(4), "the transform is not 16 finite numbers", ""
     matrix = np.asarray(values, dtype=np.float64).reshape(4, 4).T
     if matrix[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
-        return matrix, "the transform is not affine; is it written row by row?", ""
+        return matrix, "the transform is not affine; is it in row-major order?", ""
     rotation = matrix[:3, :3]
     if not abs(np.linalg.det(rotation)) > 0:
-        return matrix, "the transform flattens space", ""
+        return matrix, "the transform is singular", ""
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if off > RIGID_TOLERANCE or np.linalg.det(rotation) < 0:
         return matrix, "", f"the transform is not rigid: off by {off:.2g}"
     return matrix, "", ""
 
 
-def numbers(values: Any, count: int) -> bool:
-    """Whether values are a list of that many finite numbers."""
+def is_number_list(values: Any, count: int) -> bool:
+    """Whether values are a list of `count` finite numbers."""
     return (
         isinstance(values, list)
         and len(values) == count
@@ -88,19 +88,19 @@ def numbers(values: Any, count: int) -> bool:
 
 
 def volume_problem(volume: Any) -> str:
-    """What is wrong with a bounding volume, "" if nothing is."""
+    """Return the problem of a bounding volume, "" if it is valid."""
     if not isinstance(volume, dict):
         return "no bounding volume"
     if "box" in volume:
-        if not numbers(volume["box"], 12):
+        if not is_number_list(volume["box"], 12):
             return "box is not 12 finite numbers"
         axes = np.array(volume["box"][3:], np.float64).reshape(3, 3)
         return "" if abs(np.linalg.det(axes)) > 0 else "box is flat"
     if "sphere" in volume:
-        return "" if numbers(volume["sphere"], 4) and volume["sphere"][3] > 0 else "sphere is not 4 numbers"
+        return "" if is_number_list(volume["sphere"], 4) and volume["sphere"][3] > 0 else "sphere is not 4 numbers"
     if "region" in volume:
         region = volume["region"]
-        if not numbers(region, 6):
+        if not is_number_list(region, 6):
             return "region is not 6 finite numbers"
         west, south, east, north, low, high = region
         angles = max(abs(west), abs(east)) <= math.pi and max(abs(south), abs(north)) <= math.pi / 2
@@ -142,7 +142,7 @@ def _outside_region(region: list[float], points: Points) -> float:
 
 
 def _surface_points(volume: dict[str, Any]) -> Points:
-    """Corners of a box; points all over a sphere, its tangent points along the axes among them."""
+    """Return the corners of a box, or points on a sphere, including those along the axes."""
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     if "box" in volume:
         box = np.asarray(volume["box"], dtype=np.float64)
@@ -153,7 +153,7 @@ def _surface_points(volume: dict[str, Any]) -> Points:
 
 
 def _region_points(region: list[float]) -> Points:
-    """A grid of 9 x 9 x 2 points of a region, ECEF: between them the earth bulges by less than 1/500 of its size."""
+    """Return 9 x 9 x 2 points of a region, ECEF: between them the earth bulges by less than 1/500 of its size."""
     west, south, east, north, low, high = region
     width = east - west if east >= west else east - west + 2 * math.pi
     lon = np.mod(np.degrees(west + width * np.linspace(0, 1, 9)) + 180.0, 360.0) - 180.0

@@ -1,1 +1,1 @@
-"""PLY and OBJ as they are read back: by trimesh, after their size and the files they name have been looked at."""
+"""Reading of PLY and OBJ by trimesh, after checks of their size and of referenced files."""

@@ -1,4 +1,4 @@
-"""Checks of PLY and OBJ files: a closed solid, and references that are there."""
+"""Checks of PLY and OBJ files: a closed solid, and existing references."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, check_solid
 from exporters.solid import merged_by_position
 from exporters.triangles.files import read_triangles, references_of
-from georef.untrusted.json_file import is_there
+from georef.untrusted.json_file import is_plain_file
 
 
 def check_triangles(path: Path) -> list[Finding]:
-    """Findings about a .ply or .obj file."""
+    """Check a .ply or .obj file."""
     try:
         mesh = read_triangles(path)
     except ExportError as error:
@@ -29,9 +29,9 @@ def check_triangles(path: Path) -> list[Finding]:
 
 
 def _check_references(path: Path) -> list[Finding]:
-    """Files that an OBJ and its material libraries name but that are not there."""
+    """Report missing files that an OBJ and its material libraries refer to."""
     return [
-        Finding("error", "REFERENCE", f"{name} is not there", f"{file.name}: {word}")
+        Finding("error", "REFERENCE", f"{name} not found", f"{file.name}: {word}")
         for file, word, name, target in references_of(path)
-        if not is_there(target)
+        if not is_plain_file(target)
     ]

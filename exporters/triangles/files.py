@@ -1,4 +1,4 @@
-"""PLY and OBJ files: what they say of their size and of further files, and their triangles as trimesh reads them.
+"""PLY and OBJ files: their size and references, and their triangles, read by trimesh.
 
 http://paulbourke.net/dataformats/obj/ and http://paulbourke.net/dataformats/mtl/
 """
@@ -14,8 +14,8 @@ import numpy as np
 
 from exporters.errors import ExportError
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.image_file import check_head
-from georef.untrusted.json_file import is_there, read_bytes
+from georef.untrusted.image_file import check_header
+from georef.untrusted.json_file import is_plain_file, read_bytes
 
 MAX_TRIANGLE_BYTES = 256 << 20
 """Largest PLY or OBJ that is read: some 10 million triangles; trimesh needs about ten times as much memory."""
@@ -26,48 +26,48 @@ MAX_LIBRARY_BYTES = 1 << 20
 MAX_TEXTURE_BYTES = 256 << 20
 
 MAX_REFERENCES = 64
-"""Files that an OBJ and its libraries name; figures have two."""
+"""Limit of files that an OBJ and its libraries refer to; figures have two."""
 
 Reference = tuple[Path, str, str, Path]
-"""The file that names another, by which word, the name, and where that would be."""
+"""File, keyword, referenced name, and its path."""
 
 
 def references_of(path: Path) -> list[Reference]:
-    """The material libraries that an OBJ names, and the textures that those name, each once.
+    """Return the material libraries of an OBJ, and the textures of those, each once.
 
     Raises ExportError for more than `MAX_REFERENCES`, and for a file that cannot be read.
     """
     libraries = list(_named(path, "mtllib", MAX_TRIANGLE_BYTES))
-    there = [library for *_, library in libraries if is_there(library)]
-    found = libraries + [texture for each in there for texture in _named(each, "map_Kd", MAX_LIBRARY_BYTES)]
+    existing = [library for *_, library in libraries if is_plain_file(library)]
+    found = libraries + [texture for each in existing for texture in _named(each, "map_Kd", MAX_LIBRARY_BYTES)]
     if len(found) > MAX_REFERENCES:
-        raise ExportError(path, f"names {len(found)} files", f"give a model with at most {MAX_REFERENCES}")
+        raise ExportError(path, f"refers to {len(found)} files", f"give a model with at most {MAX_REFERENCES}")
     return found
 
 
 def check_triangle_file(path: Path) -> None:
-    """Raise ExportError for a .ply or .obj that would cost too much, or that names devices, pipes or huge files."""
+    """Raise ExportError for a .ply or .obj that is too large, or that refers to devices, pipes or huge files."""
     try:
         size = path.stat().st_size
         if not path.is_file():
-            raise ExportError(path, "no plain file", "give a .ply or .obj file")
+            raise ExportError(path, "not a regular file", "give a .ply or .obj file")
     except OSError as error:
-        raise ExportError(path, error.strerror or "cannot be read", "check the name") from None
+        raise ExportError(path, error.strerror or "cannot be read", "check the path") from None
     if size > MAX_TRIANGLE_BYTES:
-        finding = f"{size / 1e6:.0f} MB are more than the {MAX_TRIANGLE_BYTES / 1e6:.0f} MB that are read"
+        finding = f"{size / 1e6:.0f} MB, more than the limit of {MAX_TRIANGLE_BYTES / 1e6:.0f} MB"
         raise ExportError(path, finding, "simplify the model")
     if path.suffix.lower() != ".obj":
         return
     for file, word, name, target in references_of(path):
         if not os.path.exists(target):
-            continue  # for `exporters.validate` to say
+            continue  # reported by `exporters.validate`
         limit = MAX_LIBRARY_BYTES if word == "mtllib" else MAX_TEXTURE_BYTES
         try:
             data = read_bytes(target, limit)
             if word == "map_Kd":
-                check_head(data)
+                check_header(data)
         except (OSError, DamagedFile) as error:
-            raise ExportError(file, f"{word} {name[:80]}: {error}", "give the model with its own files") from None
+            raise ExportError(file, f"{word} {name[:80]}: {error}", "give the model with its files") from None
 
 
 def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
@@ -75,7 +75,7 @@ def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
         data = read_bytes(file, limit)
     except (OSError, DamagedFile) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise ExportError(file, reason, "give the model with its own files") from None
+        raise ExportError(file, reason, "give the model with its files") from None
     known = set()
     for line in data.splitlines():
         if not line.lstrip().startswith(keyword.encode()):
@@ -88,19 +88,19 @@ def _named(file: Path, keyword: str, limit: int) -> Iterator[Reference]:
 
 
 def read_triangles(path: Path) -> Any:
-    """A .ply or .obj file as trimesh.Trimesh, its vertices not merged. Raises ExportError if unreadable."""
+    """Read a .ply or .obj file as trimesh.Trimesh, without merging vertices. Raises ExportError if unreadable."""
     import trimesh
 
     check_triangle_file(path)
     try:
         mesh = trimesh.load_mesh(str(path), process=False)
-    except Exception as error:  # trimesh lets whatever its parsers meet through
+    except Exception as error:  # trimesh passes on all exceptions of its parsers
         raise ExportError(path, f"cannot be read ({error})", "write it again") from error
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise ExportError(path, "holds no single triangle mesh", "write it again")
+        raise ExportError(path, "does not contain a single triangle mesh", "write it again")
     faces, vertices = np.asarray(mesh.faces), np.asarray(mesh.vertices)
     if vertices.shape[1:] != (3,):
-        raise ExportError(path, "has vertices of other than 3 coordinates", "write it again")
+        raise ExportError(path, "its vertices do not have 3 coordinates", "write it again")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise ExportError(path, "has triangles of vertices that are not there", "write it again")
+        raise ExportError(path, "its triangles use vertices that do not exist", "write it again")
     return mesh

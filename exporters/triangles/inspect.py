@@ -1,4 +1,4 @@
-"""What is in a PLY or OBJ file."""
+"""Facts about PLY and OBJ files."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from exporters.triangles.files import read_triangles
 
 
 def triangle_facts(path: Path) -> dict[str, Any]:
-    """Facts about a .ply or .obj file; see `exporters.inspect.inspect`."""
+    """Return facts about a .ply or .obj file; see `exporters.inspect.inspect`."""
     mesh = read_triangles(path)
     vertices, faces = merged_by_position(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     image = getattr(getattr(mesh.visual, "material", None), "image", None)
     ply = path.suffix.lower() == ".ply"
-    beside = [] if ply else [path.with_suffix(".mtl"), path.with_name(f"{path.stem}_texture.png")]
+    companions = [] if ply else [path.with_suffix(".mtl"), path.with_name(f"{path.stem}_texture.png")]
     return {
         "format": "Stanford PLY" if ply else "Wavefront OBJ",
-        "files": file_sizes(path, *beside),
+        "files": file_sizes(path, *companions),
         "name": path.stem,
         "vertices": len(mesh.vertices),
         **solid_facts(vertices, faces),
@@ -32,7 +32,7 @@ def triangle_facts(path: Path) -> dict[str, Any]:
 
 
 def _comments(path: Path) -> dict[str, Any]:
-    """Credits and place from the comments that our PLY and OBJ writers put at the top."""
+    """Read credits and place from the comments at the top that fig2mesh writes."""
     facts: dict[str, Any] = {}
     place: dict[str, Any] = {}
     with path.open("rb") as stream:

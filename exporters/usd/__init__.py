@@ -1,1 +1,1 @@
-"""OpenUSD: writing, checking and inspecting stages; strangers' stages are read in a process of their own."""
+"""OpenUSD: writing, checking and inspecting stages; stages are read in a separate process."""

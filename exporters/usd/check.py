@@ -1,7 +1,7 @@
-"""Checks of OpenUSD files: pxr.UsdValidation, the topology check it leaves out, and our own promises.
+"""Checks of OpenUSD files: pxr.UsdValidation, the topology check that it omits, and the guarantees of fig2mesh.
 
-Files from elsewhere promise less: what USD does not demand of them (metres, y up, a closed solid) is worth an info.
-Every variant of the default prim is looked at, one variant set at a time, the others as they are selected.
+Foreign files guarantee less: properties that USD does not require (metres, y up, a closed solid) are reported as infos.
+Every variant of the default prim is checked, one variant set at a time, with the selected variants of the others.
 
 https://openusd.org/release/api/usd_validation_page_front.html
 """
@@ -20,20 +20,20 @@ from exporters.usd.place import check_usd_place
 from exporters.usd.usdz import check_usdz
 
 MAX_VARIANTS = 20
-"""Variants of one set that are looked at: some files of others have hundreds."""
+"""Limit of checked variants per set: some foreign files have hundreds."""
 
 
 def open_stage(path: Path) -> Any:
-    """A stage of what is on disk now. Raises ExportError for what USD cannot open, or without usd-core."""
+    """Open a stage from disk. Raises ExportError for files that USD cannot open, or without usd-core."""
     try:
         from pxr import Tf, Usd
     except ImportError as error:
-        raise ExportError(path, "usd-core is not installed", "pip install usd-core") from error
+        raise ExportError(path, "usd-core is not installed", "install it with pip install usd-core") from error
     if not path.is_file():
-        raise ExportError(path, "is not there", "check the name")
+        raise ExportError(path, "no such file", "check the path")
     try:
         stage = Usd.Stage.Open(str(path))
-        # USD keeps layers by name: without this a file written twice shows its first version.
+        # USD caches layers by name: without this a rewritten file shows its first version.
         stage.Reload()
     except Tf.ErrorException as error:
         raise ExportError(path, "USD cannot open it", "write it again") from error
@@ -41,17 +41,17 @@ def open_stage(path: Path) -> Any:
 
 
 def reason_of(error: Exception) -> str:
-    """What USD has to say of damage, without the place in its own source."""
+    """Message of a USD error about a damaged file, without the location in its source code."""
     return "USD cannot read it (" + " ".join(str(error).rpartition(" : '")[2].split())[:100].rstrip("'") + ")"
 
 
-def is_ours(stage: Any) -> bool:
-    """Whether the root layer says that fig2mesh wrote it."""
+def is_own(stage: Any) -> bool:
+    """Whether the root layer was written by fig2mesh."""
     return bool(stage.GetRootLayer().customLayerData.get("generator") == "fig2mesh")
 
 
 def variations(stage: Any) -> Iterator[str]:
-    """Select every variant of the default prim in turn, in the session layer, and give its name, "" for none."""
+    """Select every variant of the default prim in turn, in the session layer, and yield its name, "" if none."""
     from pxr import Usd
 
     prim = stage.GetDefaultPrim()
@@ -72,7 +72,7 @@ def variations(stage: Any) -> Iterator[str]:
 
 
 def check_usd(path: Path) -> list[Finding]:
-    """Findings about a .usda, .usdc or .usdz file."""
+    """Check a .usda, .usdc or .usdz file."""
     findings = check_usdz(path) if path.suffix.lower() == ".usdz" and path.is_file() else []
     try:
         stage = open_stage(path)
@@ -82,7 +82,7 @@ def check_usd(path: Path) -> list[Finding]:
 
     try:
         return findings + _check_stage(stage, path)
-    except Tf.ErrorException as error:  # binary layers are unpacked as they are asked for
+    except Tf.ErrorException as error:  # binary layers are read lazily
         return [Finding("error", "UNREADABLE", reason_of(error), path.name), *findings]
 
 
@@ -90,16 +90,16 @@ def _check_stage(stage: Any, path: Path) -> list[Finding]:
     from pxr import UsdGeom
 
     findings: list[Finding] = []
-    ours = is_ours(stage)
+    own = is_own(stage)
     if UsdGeom.GetStageMetersPerUnit(stage) != 1.0 or UsdGeom.GetStageUpAxis(stage) != UsdGeom.Tokens.y:
-        found = f"{UsdGeom.GetStageMetersPerUnit(stage):g} m a unit, {UsdGeom.GetStageUpAxis(stage)} up"
-        message = f"the stage has {found}" + (", not metres and Y" if ours else "")
-        findings.append(Finding("error" if ours else "info", "STAGE_UNITS", message, path.name))
-    findings += check_usd_place(stage, path.name, ours)
+        found = f"{UsdGeom.GetStageMetersPerUnit(stage):g} m per unit, {UsdGeom.GetStageUpAxis(stage)} up"
+        message = f"the stage has {found}" + (", not metres and Y" if own else "")
+        findings.append(Finding("error" if own else "info", "STAGE_UNITS", message, path.name))
+    findings += check_usd_place(stage, path.name, own)
     for variation in variations(stage):
         name = f"{path.name}: {variation}" if variation else path.name
-        # What all variants share would be found again in each.
-        findings += [finding for finding in _check_selected(stage, name, ours) if not _known(finding, findings)]
+        # Findings about the parts that all variants share would be repeated.
+        findings += [finding for finding in _check_selected(stage, name, own) if not _known(finding, findings)]
     return findings
 
 
@@ -110,7 +110,7 @@ def _known(finding: Finding, before: list[Finding]) -> bool:
     return any(key(finding) == key(each) for each in before)
 
 
-def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
+def _check_selected(stage: Any, name: str, own: bool) -> list[Finding]:
     from pxr import UsdGeom, UsdShade, UsdValidation
 
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
@@ -126,9 +126,9 @@ def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
     prims = list(stage.Traverse())
     meshes = [UsdGeom.Mesh(prim) for prim in prims if prim.IsA(UsdGeom.Mesh)]
     if not meshes:
-        findings.append(Finding("error" if ours else "info", "NO_MESH", "no mesh", name))
+        findings.append(Finding("error" if own else "info", "NO_MESH", "no mesh", name))
     for mesh in meshes:
-        findings += _check_mesh(mesh, f"{name}: {mesh.GetPath()}", ours)
+        findings += _check_mesh(mesh, f"{name}: {mesh.GetPath()}", own)
     for prim in prims:
         shader = UsdShade.Shader(prim)
         if not shader or shader.GetIdAttr().Get() != "UsdUVTexture":
@@ -136,24 +136,26 @@ def _check_selected(stage: Any, name: str, ours: bool) -> list[Finding]:
         file = shader.GetInput("file")
         asset = file.Get() if file else None
         if asset is not None and ("<UDIM>" in asset.path or file.HasConnectedSource()):
-            continue  # named by a pattern, or elsewhere
+            continue  # a pattern, or connected to another input
         if asset is None or not asset.resolvedPath:
-            findings.append(Finding("error", "TEXTURE", f"{asset} is not there", f"{name}: {prim.GetPath()}"))
+            findings.append(Finding("error", "TEXTURE", f"{asset} not found", f"{name}: {prim.GetPath()}"))
     return findings
 
 
-def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
+def _check_mesh(mesh: Any, where: str, own: bool) -> list[Finding]:
     from pxr import Usd, UsdGeom
 
-    promise: Severity = "error" if ours else "info"
-    first = Usd.TimeCode.EarliestTime()  # of what does not move, its only value
+    severity: Severity = "error" if own else "info"
+    first = Usd.TimeCode.EarliestTime()  # the only value without animation
     findings = []
     if mesh.GetSubdivisionSchemeAttr().Get() != UsdGeom.Tokens.none:
-        findings.append(Finding(promise, "SUBDIVISION", "subdivisionScheme is not none: viewers smooth it", where))
+        findings.append(
+            Finding(severity, "SUBDIVISION", "subdivisionScheme is not none: viewers smooth the mesh", where)
+        )
     points = np.array(mesh.GetPointsAttr().Get(first) or [], dtype=np.float64).reshape(-1, 3)
     counts = np.array(mesh.GetFaceVertexCountsAttr().Get(first) or [], dtype=np.int64)
     indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(first) or [], dtype=np.int64)
-    if not len(indices) and not ours:
+    if not len(indices) and not own:
         return [*findings, Finding("info", "NO_FACES", "no faces", where)]
     valid, reason = UsdGeom.Mesh.ValidateTopology(
         mesh.GetFaceVertexIndicesAttr().Get(first) or [], mesh.GetFaceVertexCountsAttr().Get(first) or [], len(points)
@@ -164,10 +166,12 @@ def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
         return [*findings, Finding("error", "NOT_FINITE", "points are NaN or infinite", where)]
     extent = np.array(mesh.GetExtentAttr().Get(first) or np.full((2, 3), np.nan), dtype=np.float64)
     if not np.array_equal(extent, [points.min(axis=0), points.max(axis=0)]):
-        # A larger one is as good; without one, or with a smaller, viewers may cull what can be seen.
-        holds = bool((extent[0] <= points.min(axis=0)).all() and (extent[1] >= points.max(axis=0)).all())
-        severity: Severity = "error" if ours else "info" if holds else "warning"
-        findings.append(Finding(severity, "EXTENT", f"extent is {extent.tolist()}, not that of the points", where))
+        # A larger one is valid; without one, or with a smaller one, viewers may cull visible parts.
+        contains = bool((extent[0] <= points.min(axis=0)).all() and (extent[1] >= points.max(axis=0)).all())
+        extent_severity: Severity = "error" if own else "info" if contains else "warning"
+        findings.append(
+            Finding(extent_severity, "EXTENT", f"extent is {extent.tolist()}, not that of the points", where)
+        )
     for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues():
         size = {"constant": 1, "uniform": len(counts), "vertex": len(points), "faceVarying": len(indices)}
         size["varying"] = size["vertex"]
@@ -182,4 +186,4 @@ def _check_mesh(mesh: Any, where: str, ours: bool) -> list[Finding]:
     flip = mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded
     faces = indices.reshape(-1, 3)[:, ::-1] if flip else indices.reshape(-1, 3)
     solid = check_solid(points, faces, where)
-    return findings + (solid if ours else as_infos(solid))
+    return findings + (solid if own else as_infos(solid))

@@ -1,4 +1,4 @@
-"""What is in an OpenUSD file."""
+"""Facts about OpenUSD files."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ FORMATS = {".usda": "OpenUSD text", ".usdc": "OpenUSD binary", ".usdz": "OpenUSD
 
 
 def usd_facts(path: Path) -> dict[str, Any]:
-    """Facts about a .usda, .usdc or .usdz file; see `exporters.inspect.inspect`.
+    """Return facts about a .usda, .usdc or .usdz file; see `exporters.inspect.inspect`.
 
-    Vertices are in the frame of the default prim; faces of more corners are counted as the triangles of a fan.
+    Vertices are in the frame of the default prim; polygons are counted as triangle fans.
     """
     stage = open_stage(path)
     from pxr import Tf
 
     try:
         return _stage_facts(stage, path)
-    except Tf.ErrorException as error:  # binary layers are unpacked as they are asked for
+    except Tf.ErrorException as error:  # binary layers are read lazily
         raise ExportError(path, reason_of(error), "write it again") from error
 
 
@@ -52,7 +52,7 @@ def _stage_facts(stage: Any, path: Path) -> dict[str, Any]:
             found, files = _selected(stage)
             textures += files
             lods.append({"variant": variation.partition("=")[2], **found})
-    if not lods:  # variants of another kind: as they are selected
+    if not lods:  # other variant sets: the selected variants
         found, textures = _selected(stage)
         lods.append({"variant": "", **found})
     result |= {key: value for key, value in lods[0].items() if key != "variant"}
@@ -64,7 +64,7 @@ def _stage_facts(stage: Any, path: Path) -> dict[str, Any]:
 
 
 def _selected(stage: Any) -> tuple[dict[str, Any], list[Path]]:
-    """Facts about the stage as its variants are selected, and the textures that it names."""
+    """Return facts about the stage with the selected variants, and its textures."""
     from pxr import Ar, UsdGeom, UsdShade
 
     prims = list(stage.Traverse())
@@ -100,17 +100,17 @@ def _triangles(mesh: Any, root: Any) -> tuple[NDArray[np.float64], NDArray[np.in
     """Points (V, 3) in the frame of `root` and triangles (F, 3) of a mesh."""
     from pxr import Usd, UsdGeom
 
-    first = Usd.TimeCode.EarliestTime()  # of what does not move, its only value
+    first = Usd.TimeCode.EarliestTime()  # the only value without animation
     points = np.array(mesh.GetPointsAttr().Get(first) or [], dtype=np.float64).reshape(-1, 3)
     counts = np.array(mesh.GetFaceVertexCountsAttr().Get(first) or [], dtype=np.int64)
     indices = np.array(mesh.GetFaceVertexIndicesAttr().Get(first) or [], dtype=np.int64)
     if len(indices) != counts.sum() or (len(indices) and (indices.min() < 0 or indices.max() >= len(points))):
-        raise DamagedFile("faces name points that are not there")
+        raise DamagedFile("faces refer to points that do not exist")
     cache = UsdGeom.XformCache(first)
     matrix = cache.GetLocalToWorldTransform(mesh.GetPrim())
     if root:
         matrix = matrix * cache.GetLocalToWorldTransform(root).GetInverse()
-    moved = np.array(matrix)  # of rows: USD multiplies from the left
+    moved = np.array(matrix)  # acts on row vectors
     if not np.allclose(moved, np.eye(4), rtol=0, atol=1e-12):
         points = points @ moved[:3, :3] + moved[3, :3]
     starts = np.concatenate([[0], np.cumsum(counts)])[:-1]

@@ -1,11 +1,11 @@
-"""The mesh and the material of one level of detail as USD prims.
+"""Mesh and material of one level of detail as USD prims.
 
 https://openusd.org/release/api/usd_geom_page_front.html
 https://openusd.org/release/spec_usdpreviewsurface.html
 
-Look: the texture feeds diffuseColor of a fully rough surface. UsdPreviewSurface has no unlit mode. The other
-candidate, texture as emissiveColor over black, is exact in usdview but black in whatever takes only the base colour
-(thumbnails, converters, game engines), and in path tracers the figure glows at night and drops out of the shading.
+Appearance: the texture feeds diffuseColor of a fully rough surface. UsdPreviewSurface has no unlit mode. The other
+candidate, texture as emissiveColor over black, is exact in usdview but black in programs that use only the base colour
+(thumbnails, converters, game engines), and in path tracers the figure glows at night and has no shading.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from exporters.sampling import face_parts, vertex_colors
 from exporters.solid import solid_of, unit_normals
 
 NORMAL_TOLERANCE = 1e-3
-"""Copies of a vertex whose normals differ by less, in length of the difference, are written as one smooth vertex."""
+"""Tolerance of the normals of copies of a vertex; below it, they are written as one smooth vertex."""
 
 
 def define_mesh(stage: Any, source: TexturedMesh, part_names: dict[int, str]) -> Any:
@@ -30,7 +30,7 @@ def define_mesh(stage: Any, source: TexturedMesh, part_names: dict[int, str]) ->
     solid = solid_of(source)
     points = source.vertices[solid.first]
     mesh = UsdGeom.Mesh.Define(stage, "/Figure/Mesh")
-    # Without this, subdivision is the default and viewers melt the figure.
+    # Without this, subdivision is the default and viewers smooth the figure.
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
     mesh.CreateDoubleSidedAttr(False)
@@ -83,7 +83,7 @@ def _define_parts(mesh: Any, source: TexturedMesh, part_names: dict[int, str]) -
 
 
 def define_material(stage: Any, mesh: Any, texture: str) -> None:
-    """Define /Figure/Looks/Drawing at the stage's edit target and bind it; texture : a file beside the layer."""
+    """Define /Figure/Looks/Drawing at the stage's edit target and bind it; texture : a file next to the layer."""
     from pxr import Sdf, UsdGeom, UsdShade
 
     types = Sdf.ValueTypeNames

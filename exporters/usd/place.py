@@ -1,4 +1,4 @@
-"""The place of a figure as a USD stage tells it, in each of the ways that it is written.
+"""Place of a figure in a USD stage, in each of the schemas that are written.
 
 https://github.com/CesiumGS/cesium-omniverse
 https://docs.omniverse.nvidia.com/kit/docs/omni.usd.schema.geospatial/latest/USD_SCHEMAS.html
@@ -36,8 +36,8 @@ def heading_of(prim: Any) -> float:
     return math.degrees(math.atan2(front[0], -front[2])) % 360.0
 
 
-def check_usd_place(stage: Any, name: str, ours: bool) -> list[Finding]:
-    """Whether all that a stage says of the place of its default prim is the same; ours : the record must agree too."""
+def check_usd_place(stage: Any, name: str, own: bool) -> list[Finding]:
+    """Check that all places of the default prim of a stage agree; own : also with the record, in files by fig2mesh."""
     prim = stage.GetDefaultPrim()
     if not prim:
         return []
@@ -45,28 +45,28 @@ def check_usd_place(stage: Any, name: str, ours: bool) -> list[Finding]:
     findings = []
     anchor, reference = anchor_of(prim), reference_position_of(prim)
     if anchor is not None and reference is not None:
-        findings += check_same_place(anchor, reference, "omni:geospatial beside cesium:anchor", where)
+        findings += check_same_place(anchor, reference, "omni:geospatial compared with cesium:anchor", where)
     record = dict(stage.GetRootLayer().customLayerData.get("georeference", {}))
-    if not ours or not (record or anchor or reference):
+    if not own or not (record or anchor or reference):
         return findings
     problems = check_place(record, f"{name}: customLayerData")
     if problems:
         return findings + problems
-    said = (record["lon_deg"], record["lat_deg"], record["height_m"])
+    recorded = (record["lon_deg"], record["lat_deg"], record["height_m"])
     origin = stage.GetPrimAtPath("/CesiumGeoreference")
     others = {
         "cesium:anchor": anchor,
         "omni:geospatial": reference,
         "CesiumGeoreference": _cesium(origin, "cesium:georeferenceOrigin:") if origin else None,
     }
-    for who, place in others.items():
+    for source, place in others.items():
         if place is None:
-            findings.append(Finding("error", "GEOREFERENCE", f"{who} says no place", where))
+            findings.append(Finding("error", "GEOREFERENCE", f"{source} has no place", where))
         else:
-            findings += check_same_place(said, place, who, where)
+            findings += check_same_place(recorded, place, source, where)
     turn = (heading_of(prim) - record["heading_deg"] + 180.0) % 360.0 - 180.0
     if abs(turn) > HEADING_TOLERANCE_DEG:
-        findings.append(Finding("error", "GEOREFERENCE", f"is turned {turn:.3g} degrees from its heading", where))
+        findings.append(Finding("error", "GEOREFERENCE", f"rotated {turn:.3g} degrees from its heading", where))
     return findings
 
 

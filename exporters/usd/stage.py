@@ -1,16 +1,16 @@
-"""OpenUSD: .usda and .usdc with the texture beside them, .usdz with everything inside.
+"""Writer of OpenUSD: .usda and .usdc with textures next to them, self-contained .usdz.
 
 https://openusd.org/release/api/usd_geom_page_front.html
 https://openusd.org/release/spec_usdz.html
 https://docs.omniverse.nvidia.com/kit/docs/omni.usd.schema.geospatial/latest/USD_SCHEMAS.html
 https://github.com/CesiumGS/cesium-omniverse
 
-Place: there is no georeference in USD itself, so both schemas in use are authored, as plain attributes that need no
-plugin: Cesium's georeference and globe anchor, NVIDIA's reference position. Both read a y-up stage as x east, y up,
-z south, which is how a figure stands that looks at the reader of a north-up map; other headings turn the figure.
+Place: USD itself has no georeference, so both schemas in use are authored, as plain attributes that need no plugin:
+Cesium's georeference and globe anchor, NVIDIA's reference position. Both interpret a y-up stage as x east, y up, z
+south, so an unrotated figure faces the reader of a north-up map; other headings rotate the figure.
 
 Levels of detail are the variants LOD0 (finest, selected), LOD1 ... of the variant set LOD of /Figure. USD has no
-switch by distance: whoever composes a scene selects. A figure of one level has no variant set.
+selection by distance: the author of a scene selects. A figure of one level has no variant set.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ def variant_name(lod: int) -> str:
 
 
 def texture_name(stem: str, lod: int) -> str:
-    """File name of the texture of a level of detail beside a layer called `stem`."""
+    """File name of the texture of a level of detail next to a layer called `stem`."""
     return stem + (f"_lod{lod}" if lod else "") + "_texture.png"
 
 
 def write_usd(asset: Asset, path: Path | str) -> None:
-    """Write all levels of detail as USD; the suffix of `path` decides which kind.
+    """Write all levels of detail as USD; the suffix of `path` determines the format.
 
     asset : vertices in the ASSET frame, written unchanged as float32; the stage is y-up, in metres
-    path : .usda or .usdc (with `<stem>_texture.png` beside it, `<stem>_lod1_texture.png` ...) or .usdz; replaced if
+    path : .usda or .usdc (with `<stem>_texture.png` next to it, `<stem>_lod1_texture.png` ...) or .usdz; replaced if
         it exists
 
     The same asset and file name give the same bytes. Raises ExportError for another suffix, or without usd-core.
@@ -56,7 +56,7 @@ def write_usd(asset: Asset, path: Path | str) -> None:
         _write_usdz(asset, path)
         return
     if suffix not in (".usda", ".usdc"):
-        raise ExportError(path, f"suffix {suffix or 'none'}", "use .usda, .usdc or .usdz")
+        raise ExportError(path, f"unknown suffix {suffix!r}", "use .usda, .usdc or .usdz")
     names = [texture_name(path.stem, lod) for lod in range(len(asset.lods))]
     _write_layer(asset, path, names)
     for name, mesh in zip(names, asset.lods, strict=True):
@@ -72,7 +72,7 @@ def _write_usdz(asset: Asset, path: Path) -> None:
         members = [("figure.usdc", layer.read_bytes())]
     pictures = zip(names, asset.lods, strict=True)
     members += [(name, mesh.texture.png) for name, mesh in pictures if mesh.texture is not None]
-    # UsdUtils packs the same way but stamps files with the time of day; here equal input gives equal bytes.
+    # UsdUtils packs the same way but adds the time of day; here equal input gives equal bytes.
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for name, data in members:
             info = zipfile.ZipInfo(name)  # dated 1980-01-01
@@ -87,8 +87,8 @@ def _write_layer(asset: Asset, path: Path, textures: list[str]) -> None:
     try:
         from pxr import Kind, Sdf, Usd, UsdGeom
     except ImportError as error:
-        raise ExportError(path, "usd-core is not installed", "pip install usd-core") from error
-    # An anonymous layer, as opening `path` itself would hand out whatever layer of that name is still open.
+        raise ExportError(path, "usd-core is not installed", "install it with pip install usd-core") from error
+    # An anonymous layer, as opening `path` itself would return a layer of that name that is still open.
     layer = Sdf.Layer.CreateAnonymous(path.suffix.lower())
     stage = Usd.Stage.Open(layer)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -135,7 +135,7 @@ def _place(stage: Any, root: Any, placement: GeoPlacement) -> None:
     from pxr import Gf, Sdf, UsdGeom
 
     turn = 180.0 - placement.heading_deg
-    # The two operations that Cesium's globe anchor knows how to rewrite when the prim is moved.
+    # The two operations that Cesium's globe anchor can update when the prim is moved.
     root.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(0.0))
     root.AddRotateXYZOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(0.0, turn, 0.0))
 

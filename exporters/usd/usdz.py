@@ -1,4 +1,4 @@
-"""Checks of the package around a .usdz file.
+"""Checks of the archive of a .usdz file.
 
 https://openusd.org/release/spec_usdz.html
 """
@@ -18,15 +18,15 @@ ALIGNMENT = 64
 
 
 def check_usdz(path: Path) -> list[Finding]:
-    """Findings about the archive: its first file is a layer, all are stored, plain and aligned, of allowed types."""
+    """Check the archive: the first file is a layer, all are uncompressed, unencrypted, aligned and of allowed types."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-            # Packages hold everything as it is: what unpacks to more than the file is not unpacked.
+            # Packages are uncompressed: what would decompress to more than the file is not decompressed.
             plain = sum(member.file_size for member in members) <= path.stat().st_size
             broken = archive.testzip() if plain else None
     except (zipfile.BadZipFile, OSError, NotImplementedError, ValueError, zlib.error) as error:
-        return [Finding("error", "UNREADABLE", f"no readable archive ({error})", path.name)]
+        return [Finding("error", "UNREADABLE", f"not a readable archive ({error})", path.name)]
     findings = []
 
     def note(name: str, message: str) -> None:
@@ -35,7 +35,7 @@ def check_usdz(path: Path) -> list[Finding]:
     if broken is not None:
         note(broken, "is damaged")
     if not members or PurePosixPath(members[0].filename).suffix.lower() not in LAYERS:
-        note(members[0].filename if members else "", "the first file is no layer")
+        note(members[0].filename if members else "", "the first file is not a layer")
     with path.open("rb") as stream:
         for member in members:
             if member.compress_type != zipfile.ZIP_STORED:
@@ -47,7 +47,7 @@ def check_usdz(path: Path) -> list[Finding]:
                 note(member.filename, "leads out of the package")
             if PurePosixPath(member.filename).suffix.lower() not in ALLOWED:
                 note(member.filename, "is of a type that packages may not hold")
-            # The local header, not the directory's, says where the data begins.
+            # The local header, not that in the directory, determines where the data begins.
             stream.seek(member.header_offset + 26)
             head = stream.read(4)
             if len(head) < 4:
@@ -56,5 +56,5 @@ def check_usdz(path: Path) -> list[Finding]:
             name, extra = struct.unpack("<2H", head)
             start = member.header_offset + 30 + name + extra
             if start % ALIGNMENT:
-                note(member.filename, f"begins at byte {start}, no multiple of {ALIGNMENT}")
+                note(member.filename, f"begins at byte {start}, not a multiple of {ALIGNMENT}")
     return findings

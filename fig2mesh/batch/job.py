@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from exporters.atomic_file import atomic_path, sweep_temporary
 from exporters.gis.time_span import time_span
-from exporters.tiles.tileset import too_near_note
+from exporters.tiles.tileset import short_range_warning
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column
 from fig2mesh.batch.engine import Engine, StageNotice
@@ -74,7 +74,7 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
             title = request.title or request.collection.stem
             summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
             _log_summary(folder, tally, summary)
-            if summary.figures and (note := too_near_note(request.visible_from, summary.tallest_m)):
+            if summary.figures and (note := short_range_warning(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)
         return 0 if not tally.failed else 1 if tally.internal else 2
 

@@ -52,7 +52,7 @@ class BatchRequest:
     root: Path | None = option(
         default=None,
         metavar="DIR",
-        help="Folder outside of which rows may not name files. Default: COLLECTION's folder.",
+        help="Rows may only refer to files inside this folder. Default: COLLECTION's folder.",
     )
     layer: str | None = option(
         default=None, metavar="NAME", help="Layer of a GeoPackage. Default: the only one with a column figure."

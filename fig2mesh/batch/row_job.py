@@ -83,7 +83,7 @@ def convert_row(batch: Batch, task: RowTask, advance: Advance = lambda stage: No
             fault = error
             # Errors of the disk may not recur; errors of the input will.
             record |= {"status": "failed", "error": batch.roots.shorten(_line(error))}
-            record["lasting"] = "key" in record and error.lasting
+            record["lasting"] = "key" in record and error.permanent
         except Exception as error:
             fault = error
             found = f"internal error: {type(error).__name__}: {_line(error)}"

@@ -70,13 +70,13 @@ def pack(assets: Path | None, poses: int, seed: int, out: Path, overwrite: bool)
 @click.option("--jobs", type=click.IntRange(1, 64), default=1, show_default=True, metavar="N", help=JOBS)
 def build(pack: Path, out: Path, bodies: int, valid: int, pictures: bool, shapes: bool, seed: int, jobs: int) -> None:
     """Make samples from a pack: parts, distances, masks, joints and pictures from four sides."""
-    from fig2mesh.training.samples.build import Wanted
+    from fig2mesh.training.samples.build import BuildOptions
     from fig2mesh.training.samples.build import build as run
 
     run(
         pack,
         out,
-        Wanted(bodies, valid, seed, pictures, shapes),
+        BuildOptions(bodies, valid, seed, pictures, shapes),
         jobs=jobs,
         report=lambda done, total: click.echo(f"{done} of {total} shards", err=True),
     )

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import click
 
 from fig2mesh.conversion.libraries import PACKAGES, version
+from fig2mesh.errors import SYSTEM_LIBRARIES
 
 
 @click.command()
@@ -28,7 +29,7 @@ def examine() -> Iterator[tuple[str, bool, str]]:
             importlib.import_module(module)
         except Exception as error:
             reason = " ".join(str(error).split())
-            remedy = f"; run: {_install()}" if "lib" in reason and ".so" in reason else ""
+            remedy = f"; run: {SYSTEM_LIBRARIES}" if "lib" in reason and ".so" in reason else ""
             yield distribution, False, f"{reason[:200]}{remedy}"
             continue
         yield distribution, True, version(distribution)
@@ -45,14 +46,7 @@ def _filters() -> tuple[str, bool, str]:
         usable = hasattr(pymeshlab.MeshSet(), "meshing_close_holes")
     except ImportError:
         usable = False
-    return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {_install()}"
-
-
-def _install() -> str:
-    """Command that installs the system libraries."""
-    from fig2mesh.mesh.close_pymeshlab import SYSTEM_LIBRARIES
-
-    return SYSTEM_LIBRARIES
+    return "pymeshlab filters", usable, "loaded" if usable else f"missing; run: {SYSTEM_LIBRARIES}"
 
 
 def _weights() -> tuple[str, bool, str]:

@@ -12,7 +12,7 @@ from fig2mesh.terminal import configure_logging
 
 
 @click.command()
-@click.argument("assets", type=FILE, nargs=-1, required=True, metavar="ASSET...")
+@click.argument("assets", type=FILE, nargs=-1, required=True, metavar="MODEL...")
 @click.option(
     "--overlay",
     "overlays",
@@ -31,9 +31,9 @@ def globe(
     quiet: bool,
     verbose: int,
 ) -> None:
-    """Show each ASSET on a globe in a browser, offline. Stop with Ctrl-C.
+    """Show each MODEL on a globe in a browser, offline. Stop with Ctrl-C.
 
-    ASSET is a georeferenced .glb or .gltf, a tileset.json or its folder, a .czml or a .geojson.
+    MODEL is a georeferenced .glb or .gltf, a tileset.json or its folder, a .czml or a .geojson.
     """
     from fig2mesh.globe.job import run
 

@@ -9,6 +9,7 @@ import difflib
 import os.path
 import re
 import sys
+import warnings
 from collections.abc import Collection, Sequence
 
 import click
@@ -82,6 +83,8 @@ class MainJobGroup(click.Group):
         sections["Messages"] = [name for name in options if name not in grouped]
         for title, names in sections.items():
             records = [record for name in names if name in options and (record := options[name].get_help_record(ctx))]
+            if title == "Messages":
+                records.append(("--version", "Show the version and exit."))
             with formatter.section(title):
                 formatter.write_dl(records)
         self.format_commands(ctx, formatter)
@@ -96,8 +99,8 @@ class MainJobGroup(click.Group):
 def cli() -> None:
     """Turn one drawn human figure into a closed, textured, georeferenced 3D model.
 
-    FIGURE is a picture of one figure. Its silhouette is the alpha channel or --mask, its joints are --keypoints;
-    anything missing is inferred from the picture.
+    FIGURE is a picture of one figure. The silhouette comes from --mask or the alpha channel, the
+    joints from --keypoints; anything missing is inferred from the picture.
     """
 
 
@@ -144,6 +147,8 @@ def main(arguments: list[str] | None = None) -> int:
     from georef.errors import InputError
 
     words = sys.argv[1:] if arguments is None else arguments
+    # Pillow warns of damaged tags, in two lines with a path of its own; what matters our readers say themselves.
+    warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     try:
         result = cli.main(words, prog_name="fig2mesh", standalone_mode=False)
         return result if isinstance(result, int) else 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import click
 
@@ -29,6 +30,7 @@ def run(request: Request, quiet: bool = False) -> None:
     from fig2mesh.conversion.text_file import write_text
     from fig2mesh.counters import counting
 
+    request = replace(request, outputs=request.targets)
     # Whatever can be rejected is rejected before the work begins.
     check_request(request)
     with progress(quiet) as advance, counting() as counts:

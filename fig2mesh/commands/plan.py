@@ -20,7 +20,7 @@ def plan(request: Request, as_json: bool, quiet: bool, verbose: int) -> None:
     from fig2mesh.conversion.convert import settings_of
     from fig2mesh.conversion.plan import plan as plan_of
 
-    request = replace(request, device="cpu")
+    request = replace(request, device="cpu", outputs=request.targets)
     planned = plan_of(settings_of(request), request.targets)
     if as_json:
         click.echo(json.dumps(asdict(planned), indent=2))

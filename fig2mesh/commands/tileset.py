@@ -36,18 +36,18 @@ class TilesetRequest:
 
 
 @click.command()
-@click.argument("assets", type=FILE, nargs=-1, required=True, metavar="ASSET...")
+@click.argument("assets", type=FILE, nargs=-1, required=True, metavar="MODEL...")
 @request_options(TilesetRequest)
 @messages
 def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verbose: int) -> None:
     """Gather placed figures into one 3D Tiles tileset, as a spatial tree.
 
-    ASSET is a .glb made with --lonlat or --map, the tileset of a figure (with its levels of detail), or a folder that
+    MODEL is a .glb made with --lonlat or --map, the tileset of a figure (with its levels of detail), or a folder that
     contains such files at any depth. Also writes index.geojson, a map of the figures, and figures.czml, in which they
     stand on the terrain.
     """
     from exporters.tiles.gather import write_figures
-    from exporters.tiles.tileset import too_near_note
+    from exporters.tiles.tileset import short_range_warning
 
     configure_logging(quiet, verbose)
     written = write_figures(
@@ -58,6 +58,6 @@ def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verb
         overwrite=request.overwrite,
         link=request.link,
     )
-    if note := too_near_note(request.visible_from, written.tallest_m):
+    if note := short_range_warning(request.visible_from, written.tallest_m):
         log.warning("%s", note)
     log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))

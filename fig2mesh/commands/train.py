@@ -1,8 +1,10 @@
-"""`fig2mesh train`: one command per network; heavy imports wait until a command runs."""
+"""`fig2mesh train`: one command per network; nothing heavy is imported before a command runs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +17,8 @@ from fig2mesh.training.networks.schedule import Schedule
 if TYPE_CHECKING:
     from fig2mesh.training.bodies.pack import Pack
 
-
 VARIANTS = ("one-stream", "one-stream-pose", "two-stream", "two-stream-pose")
-"""Names of `fig2mesh.nets.disn.VARIANTS`, repeated because that module imports torch."""
+"""Names of `fig2mesh.nets.disn.VARIANTS`, repeated here because that module imports torch."""
 
 BUDGET_MIN = {
     "pose": 60.0,
@@ -29,31 +30,58 @@ BUDGET_MIN = {
     "head": 20.0,
     "parse": 240.0,
 }
-"""Minutes per network where neither --budget nor --epochs is given: hours for everything on two cores."""
+"""Minutes per network without --budget and --epochs: hours for everything on two cores."""
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 
-KIND = "Kind of part. Repeatable. Default: all."
-DROPOUT = "Dropout probability; 0.5 in the paper."
-VARIANT = "Variant of the network."
+STEPS = "Thousands of steps, instead of minutes."
+"""Help of --epochs, where they have no other meaning."""
 
 
-def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator that adds the options of all commands; data : help of --data."""
+@dataclass(frozen=True)
+class TrainingRun:
+    """Options that all commands share; `rate` and `init` are None in commands without --lr and --init."""
+
+    data: Path
+    out: Path
+    budget: float | None
+    epochs: int | None
+    seed: int
+    device: str
+    rate: float | None = None
+    init: Path | None = None
+
+    def minutes(self, network: str) -> float | None:
+        """Budget of a network in minutes; None where --epochs alone limits it."""
+        return BUDGET_MIN[network] if self.budget is None and self.epochs is None else self.budget
+
+    def schedule(self, network: str) -> Schedule:
+        """Schedule of a network for which an epoch is a thousand steps."""
+        steps = None if self.epochs is None else 1000 * self.epochs
+        device = _device(self.device)
+        return Schedule(self.minutes(network), steps, self.seed, rate=self.rate, device=device, init=self.init)
+
+    def cpu_schedule(self, network: str) -> Schedule:
+        """Schedule of a network that is trained on the CPU only."""
+        if self.device == "cuda":
+            raise InputError("--device cuda", "this network is trained on the CPU", "omit the option")
+        steps = None if self.epochs is None else 1000 * self.epochs
+        return Schedule(self.minutes(network), steps, self.seed, rate=self.rate, init=self.init)
+
+
+def common(
+    data: str, epochs: str = STEPS, rate: float | None = None, init: str | None = None
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add the options of `TrainingRun`, and pass them to the command as one.
+
+    data, epochs, init : help of these options; rate : default of --lr. No rate, no --lr; no init, no --init.
+    """
     options = [
         click.option("--data", type=click.Path(path_type=Path), required=True, metavar="PATH", help=data),
         click.option("--budget", type=click.FloatRange(0, min_open=True), metavar="MIN", help="Minutes per network."),
-        click.option(
-            "--seed",
-            type=click.IntRange(0, 2**31 - 1),
-            default=0,
-            show_default=True,
-            metavar="N",
-            help="Seed of all random choices.",
-        ),
-        click.option(
-            "--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True, help="Device."
-        ),
+        click.option("--epochs", type=click.IntRange(1), metavar="N", help=epochs),
+        click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=0, show_default=True),
+        click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True),
         click.option(
             "-o",
             "--output",
@@ -61,61 +89,77 @@ def common(data: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
             type=FOLDER,
             required=True,
             metavar="OUT",
-            help="Output folder for weights, logs and checkpoints; an interrupted run resumes there.",
+            help="Folder for weights, logs and checkpoints; an interrupted run resumes there.",
         ),
     ]
+    if rate is not None:
+        options.append(
+            click.option(
+                "--lr",
+                "rate",
+                type=click.FloatRange(0, min_open=True),
+                default=rate,
+                show_default=True,
+                help="Learning rate.",
+            )
+        )
+    if init is not None:
+        options.append(click.option("--init", type=FOLDER, metavar="DIR", help=init))
 
     def add(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def run(data: Path, out: Path, budget: float | None, epochs: int | None, **given: Any) -> None:
+            shared = {name: given.pop(name) for name in ("seed", "device", "rate", "init") if name in given}
+            command(TrainingRun(data, out, budget, epochs, **shared), **given)
+
+        result: Callable[..., None] = run
         for option in reversed(options):
-            command = option(command)
-        return command
+            result = option(result)
+        return result
 
     return add
 
 
 def kinds(command: Callable[..., None]) -> Callable[..., None]:
-    """Decorator that adds the option --kind."""
-    option = click.option("--kind", "chosen", type=click.Choice(KINDS), multiple=True, help=KIND)
+    """Add the option --kind."""
+    option = click.option("--kind", "chosen", type=click.Choice(KINDS), multiple=True, help="Repeatable; default: all.")
     return option(command)
 
 
 @click.group()
 def train() -> None:
-    """Train the networks. Each command resumes an interrupted run in OUT."""
+    """Train the networks; each command resumes from the checkpoint in OUT."""
 
 
 @train.command()
-@common("Pack, or folder that contains pack.npz.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 100,000 figures, instead of --budget.")
-@click.option("--joints", type=click.Choice(["16", "21"]), default="21", show_default=True, help="Number of joints.")
-@click.option("--perspective", is_flag=True, help="Train on perspective drawings; also predict x and y.")
-@click.option("--visibility", is_flag=True, help="Use the visibility of joints as an input.")
-@click.option(
-    "--limbs/--no-limbs", default=True, show_default=True, help="Use the foreshortening of limbs as an input."
-)
-@click.option("--dropout", type=click.FloatRange(0, 0.9), default=0.1, show_default=True, help=DROPOUT)
-@click.option("--metric", is_flag=True, help="Use the units of the drawing, as the paper does.")
-@click.option("--plain", is_flag=True, help="Train on unaugmented bodies from all sides, as the paper does.")
-@click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N", help="Batch size.")
-def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, **given: Any) -> None:
-    """Train the network for the depths of joints (table 1)."""
+@common("The pack, or the folder that holds pack.npz.", epochs="Passes of 100,000 figures, instead of minutes.")
+@click.option("--joints", type=click.Choice(["16", "21"]), default="21", show_default=True)
+@click.option("--perspective", is_flag=True, help="Perspective drawings: predict x and y too.")
+@click.option("--visibility", is_flag=True, help="The visibility of joints is an input.")
+@click.option("--limbs/--no-limbs", default=True, show_default=True, help="The foreshortening of limbs is an input.")
+@click.option("--dropout", type=click.FloatRange(0, 0.9), default=0.1, show_default=True, help="The paper: 0.5.")
+@click.option("--metric", is_flag=True, help="Trust the drawing's units, as the paper does.")
+@click.option("--plain", is_flag=True, help="Undistorted bodies from all around: the paper's protocol.")
+@click.option("--batch", type=click.IntRange(2), default=512, show_default=True, metavar="N")
+def pose(run: TrainingRun, **given: Any) -> None:
+    """Train the depths of joints (table 1)."""
     from fig2mesh.nets.pose_lift import PoseLiftShape
     from fig2mesh.training.networks.train_pose import pack_skeletons, train_pose
 
     shape = PoseLiftShape(
         int(given["joints"]), given["perspective"], given["visibility"], given["limbs"], given["metric"]
     )
-    known, held = pack_skeletons(_pack(data))
+    known, held = pack_skeletons(_pack(run.data))
     _, scores = train_pose(
         known,
         held,
-        out,
+        run.out,
         Schedule(
-            budget_min=_minutes("pose", budget, epochs),
-            steps=None if epochs is None else epochs * 100_000 // given["batch"],
-            seed=given["seed"],
+            budget_min=run.minutes("pose"),
+            steps=None if run.epochs is None else run.epochs * 100_000 // given["batch"],
+            seed=run.seed,
             batch=given["batch"],
-            device=_device(device),
+            device=_device(run.device),
         ),
         shape=shape,
         augment=not given["plain"],
@@ -127,174 +171,108 @@ def pose(data: Path, out: Path, budget: float | None, epochs: int | None, device
 @train.command()
 @common("Folder of shards.")
 @kinds
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
-def size(
-    data: Path, out: Path, budget: float | None, epochs: int | None, device: str, chosen: tuple[str, ...], seed: int
-) -> None:
-    """Train the networks for the sizes of parts."""
+def size(run: TrainingRun, chosen: tuple[str, ...]) -> None:
+    """Train the sizes of parts."""
     from fig2mesh.training.networks.train_size import train_size
 
     for kind in chosen or KINDS:
         click.echo(f"{kind}:")
-        _, scores = train_size(
-            data,
-            kind,
-            out / f"size-{kind}",
-            _schedule("size", budget, epochs, seed, device=_device(device)),
-        )
+        _, scores = train_size(run.data, kind, run.out / f"size-{kind}", run.schedule("size"))
         _print_scores(scores)
 
 
 @train.command()
-@common("Folder of shards.")
-@kinds
-@click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True, help=VARIANT)
-@click.option(
-    "--epochs", type=click.IntRange(1), metavar="N", help="Passes over each part in each view, instead of --budget."
+@common(
+    "Folder of shards.",
+    epochs="Passes over all parts in all views.",
+    rate=2e-3,
+    init="Start from the weights of an earlier run in DIR/disn-….",
 )
-@click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
-@click.option("--init", type=FOLDER, metavar="DIR", help="Initialise with the weights of an earlier run in DIR/disn-….")
-def parts(
-    data: Path,
-    out: Path,
-    budget: float | None,
-    epochs: int | None,
-    device: str,
-    chosen: tuple[str, ...],
-    variant: str,
-    seed: int,
-    lr: float,
-    init: Path | None,
-) -> None:
-    """Train the networks for the shapes of parts (tables 2 and 3)."""
+@kinds
+@click.option("--variant", type=click.Choice(VARIANTS), default="two-stream-pose", show_default=True)
+def parts(run: TrainingRun, chosen: tuple[str, ...], variant: str) -> None:
+    """Train the shapes of parts (tables 2 and 3)."""
     from fig2mesh.nets.disn import DisnShape
     from fig2mesh.training.networks.train_parts import train_parts
 
     for kind in chosen or KINDS:
         click.echo(f"{kind}, {variant}:")
         scores = train_parts(
-            data,
+            run.data,
             kind,
             DisnShape.of(kind, variant),
-            out / f"disn-{kind}-{variant}",
+            run.out / f"disn-{kind}-{variant}",
             Schedule(
-                budget_min=_minutes("parts", budget, epochs),
-                seed=seed,
-                rate=lr,
-                device=_device(device),
-                init=None if init is None else init / f"disn-{kind}-{variant}",
+                budget_min=run.minutes("parts"),
+                seed=run.seed,
+                rate=run.rate,
+                device=_device(run.device),
+                init=None if run.init is None else run.init / f"disn-{kind}-{variant}",
             ),
-            epochs=epochs,
+            epochs=run.epochs,
         )
         _print_scores(scores)
 
 
 @train.command()
-@common("Folder of shards with pictures.")
-@click.option("--masks/--no-masks", default=True, show_default=True, help="Use part masks as an input.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
-@click.option("--lr", type=click.FloatRange(0, min_open=True), default=2e-3, show_default=True, help="Learning rate.")
-@click.option("--init", type=FOLDER, metavar="DIR", help="Initialise with the weights of an earlier run.")
-def uv(
-    data: Path,
-    out: Path,
-    budget: float | None,
-    epochs: int | None,
-    device: str,
-    seed: int,
-    masks: bool,
-    lr: float,
-    init: Path | None,
-) -> None:
-    """Train the network for texture coordinates (table 4)."""
+@common("Folder of shards with pictures.", rate=2e-3, init="Start from the weights of an earlier run.")
+@click.option("--masks/--no-masks", default=True, show_default=True, help="Part masks are an input.")
+def uv(run: TrainingRun, masks: bool) -> None:
+    """Train texture coordinates (table 4)."""
     from fig2mesh.nets.uv_unet import UvUnetShape
     from fig2mesh.training.networks.train_uv import train_uv
 
-    schedule = _schedule("uv", budget, epochs, seed, rate=lr, device=_device(device), init=init)
-    _print_scores(train_uv(data, out, schedule, UvUnetShape(masks)))
+    _print_scores(train_uv(run.data, run.out, run.schedule("uv"), UvUnetShape(masks)))
 
 
 @train.command()
 @common("Folder of shards with pictures.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
-def fill(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int) -> None:
-    """Train the network that chooses the source of each unseen texel's colour."""
+def fill(run: TrainingRun) -> None:
+    """Train the positions from which unseen texels take their colours."""
     from fig2mesh.training.networks.train_fill import train_fill
 
-    _print_scores(train_fill(data, out, _schedule("fill", budget, epochs, seed, device=_device(device))))
+    _print_scores(train_fill(run.data, run.out, run.schedule("fill")))
 
 
-def filled(command: Callable[..., None]) -> Callable[..., None]:
-    """Decorator that adds the option --fill."""
-    return click.option("--fill", type=FOLDER, required=True, metavar="DIR", help="Output folder of `train fill`.")(
-        command
-    )
+def with_fill(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the option --fill."""
+    return click.option("--fill", type=FOLDER, required=True, metavar="DIR", help="Output of `train fill`.")(command)
 
 
 @train.command()
 @common("Folder of shards with pictures.")
-@filled
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
-def refine(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
-    """Train the network for details of unseen sides."""
+@with_fill
+def refine(run: TrainingRun, fill: Path) -> None:
+    """Train the details of unseen sides."""
     from fig2mesh.training.networks.train_refine import train_refine
 
-    _check_cpu(device)
-    _print_scores(train_refine(data, fill, out, _schedule("refine", budget, epochs, seed)))
+    _print_scores(train_refine(run.data, fill, run.out, run.cpu_schedule("refine")))
 
 
 @train.command()
 @common("Folder of shards with pictures.")
-@filled
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
-def head(data: Path, out: Path, budget: float | None, epochs: int | None, device: str, seed: int, fill: Path) -> None:
-    """Train the network for unseen sides of heads."""
+@with_fill
+def head(run: TrainingRun, fill: Path) -> None:
+    """Train the heads of unseen sides."""
     from fig2mesh.training.networks.train_refine import train_head
 
-    _check_cpu(device)
-    _print_scores(train_head(data, fill, out, _schedule("head", budget, epochs, seed)))
+    _print_scores(train_head(run.data, fill, run.out, run.cpu_schedule("head")))
 
 
 @train.command()
-@common("Folder of crops.")
-@click.option("--epochs", type=click.IntRange(1), metavar="N", help="Epochs of 1,000 steps, instead of --budget.")
-@click.option("--lr", type=click.FloatRange(0, min_open=True), default=1e-3, show_default=True, help="Learning rate.")
-@click.option("--init", type=FOLDER, metavar="DIR", help="Initialise with the weights of an earlier run.")
+@common("Folder of crops.", rate=1e-3, init="Start from the weights of an earlier run.")
 @click.option(
     "--blazepose",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="TFLITE",
-    help="Initialise the encoder with pose_landmark_full.tflite; for its source see docs/parsing.md.",
+    help="Start the encoder from pose_landmark_full.tflite; for its source see docs/parsing.md.",
 )
-@click.option("--whole", is_flag=True, help="Also train the first stages of the encoder.")
-def parse(
-    data: Path,
-    out: Path,
-    budget: float | None,
-    epochs: int | None,
-    device: str,
-    seed: int,
-    lr: float,
-    init: Path | None,
-    blazepose: Path | None,
-    whole: bool,
-) -> None:
-    """Train the network that finds silhouette, parts and joints in a picture."""
+@click.option("--whole", is_flag=True, help="Train the encoder's first stages too.")
+def parse(run: TrainingRun, blazepose: Path | None, whole: bool) -> None:
+    """Train silhouette, parts and joints from a bare picture."""
     from fig2mesh.training.networks.train_parse import train_parse
 
-    _check_cpu(device)
-    schedule = _schedule("parse", budget, epochs, seed, rate=lr, init=init)
-    _print_scores(train_parse(data, out, schedule, blazepose=blazepose, whole=whole))
-
-
-def _schedule(network: str, budget: float | None, epochs: int | None, seed: int, **given: Any) -> Schedule:
-    """Schedule of a network whose epochs are 1,000 steps; given : further fields."""
-    steps = None if epochs is None else 1000 * epochs
-    return Schedule(_minutes(network, budget, epochs), steps, seed, **given)
-
-
-def _minutes(network: str, budget: float | None, epochs: int | None) -> float | None:
-    return BUDGET_MIN[network] if budget is None and epochs is None else budget
+    _print_scores(train_parse(run.data, run.out, run.cpu_schedule("parse"), blazepose=blazepose, whole=whole))
 
 
 def _device(name: str) -> str:
@@ -305,11 +283,6 @@ def _device(name: str) -> str:
     if name == "auto":
         return "cuda" if torch.cuda.is_available() else "cpu"
     return name
-
-
-def _check_cpu(name: str) -> None:
-    if name == "cuda":
-        raise InputError("--device cuda", "this network is trained on the CPU", "leave it out")
 
 
 def _pack(data: Path) -> Pack:

@@ -162,13 +162,14 @@ def convert(
 
 
 def settings_of(request: Request) -> Settings:
-    """Settings of a request, adapted to its outputs."""
+    """Settings of a request, adapted to its outputs; where it names none, to whatever any output may need."""
     lods = request.lods
-    if lods > 1 and request.resume_from is None and not any(has_levels(target) for target in request.targets):
+    one_level = bool(request.outputs) and not any(map(has_levels, request.outputs))
+    if lods > 1 and one_level and request.resume_from is None:
         log.info("--lods %d: only 3D Tiles and USD have levels of detail; making one", lods)
         lods = 1
     settings = replace(request.settings(), lods=lods)
-    return replace(settings, normals=normals_of(settings, request.targets).runs)
+    return replace(settings, normals=not request.outputs or normals_of(settings, request.outputs).runs)
 
 
 def check_stages(request: Request) -> None:

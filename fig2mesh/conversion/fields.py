@@ -57,8 +57,17 @@ def option(*, default: Any = dataclasses.MISSING, kw_only: bool = True, **facts:
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(option,))
 def request_class(made: type[T]) -> type[T]:
-    """Make a class a frozen dataclass whose fields are made by `option`."""
-    return dataclass(frozen=True, kw_only=True)(made)
+    """Make a class a frozen dataclass whose fields are made by `option`; its docstring gets a line for each."""
+    request = dataclass(frozen=True, kw_only=True)(made)
+    lines = [f"{each.name} : {each.type}\n    {each.metadata[OPTION].help}" for each in _options_of(request)]
+    request.__doc__ = "\n".join([made.__doc__ or "", "", "Parameters", "----------", *lines])
+    return request
+
+
+def _options_of(request: Any) -> list[dataclasses.Field[Any]]:
+    """Fields with an option, the positional ones first."""
+    found = [each for each in dataclasses.fields(request) if OPTION in each.metadata]
+    return sorted(found, key=lambda each: each.kw_only is True)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from exporters.asset import Asset
 from exporters.profiles import profile_named
-from exporters.tiles.tileset import TilesVersion, too_near_note
+from exporters.tiles.tileset import TilesVersion, short_range_warning
 from exporters.write import check_outputs, in_order, is_tileset, needs_place
 from exporters.write import write as write_asset
 from fig2mesh.conversion.convert import Conversion
@@ -95,4 +95,4 @@ def refuse_unplaced(target: str) -> None:
 
 def near_note(request: Request, height_m: float) -> str | None:
     """Warning that a tileset's figure of that height is drawn only from too near, in one line; else None."""
-    return too_near_note(request.visible_from, height_m) if any(map(is_tileset, request.targets)) else None
+    return short_range_warning(request.visible_from, height_m) if any(map(is_tileset, request.targets)) else None

@@ -171,9 +171,9 @@ def _record(request: PlaceRequest, sheet: MapSheet, location: SheetPlace, pixel:
         "degrees_of_freedom": None if quality is None else quality.degrees_of_freedom,
         "rmse_m": None if quality is None else quality.rmse_m,
         "sigma_m": None if quality is None else quality.sigma_m,
-        "left_out_rmse_m": None if quality is None else quality.left_out_rmse_m,
+        "left_out_rmse_m": None if quality is None else quality.leave_one_out_rmse_m,
         "residuals_m": [] if quality is None else list(quality.residuals_m),
-        "left_out_m": [] if quality is None else list(quality.left_out_m),
+        "left_out_m": [] if quality is None else list(quality.leave_one_out_m),
         "pixel": list(pixel),
         "lonlat": [location.lon_deg, location.lat_deg],
         "metres_per_pixel": {"up": location.up_m, "across": location.across_m},
@@ -195,8 +195,8 @@ def _summary(sheet: MapSheet, location: SheetPlace) -> str:
     if sheet.quality is None:
         return f"{sheet.file}: {where}"
     quality, count = sheet.quality, len(sheet.pixels)
-    if quality.left_out_rmse_m is not None:
-        fit = f"RMSE {quality.left_out_rmse_m:.3g} m of points left out one by one"
+    if quality.leave_one_out_rmse_m is not None:
+        fit = f"RMSE {quality.leave_one_out_rmse_m:.3g} m of points left out one by one"
     elif quality.degrees_of_freedom == 0:
         fit = "the minimum, so the fit cannot be checked"
     else:

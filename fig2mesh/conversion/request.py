@@ -5,7 +5,7 @@ The options of the command line and the columns of collections are read from the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
 
@@ -76,7 +76,7 @@ class PlaceRequest:
     )
     size_from: Literal["height", "map"] = option(
         default="height",
-        help="map: make the figure as large on the globe as it is drawn on the map, instead of --height-m.",
+        help="height: use --height-m; map: scale the figure by its drawn size and the scale of the map.",
     )
     map_transform: MapTransform = option(
         default="auto",
@@ -91,7 +91,8 @@ class PlaceRequest:
     facing: str = option(
         default="viewer",
         metavar="N|NE|…|DEG|viewer",
-        help="Compass bearing of the nose. viewer: towards the reader of the map, or south without --map.",
+        help="Direction that the figure faces: N, NE, … or degrees clockwise from north. viewer: towards the reader "
+        "of the map, or south without --map.",
     )
     height_m: float | None = option(
         default=None, metavar="M", default_text=str(FIGURE_HEIGHT), help="Height of the figure, metres."
@@ -173,7 +174,7 @@ class MeshOptions:
     effects: tuple[Effect, ...] = option(
         default=(),
         name="effect",
-        help="light: clients light the surface (default without texture); none: they show it unlit. Repeatable.",
+        help="light: clients light the surface (default without texture); none: they show it unlit.",
     )
 
 
@@ -222,7 +223,7 @@ class OutputOptions:
         default=None,
         metavar="STAGE",
         column=False,
-        help="Start at STAGE, with the earlier results in --save-stages DIR.",
+        help="Skip the stages before STAGE and load their results from the --save-stages folder (required).",
     )
     report: Path | None = option(
         default=None, metavar="JSON", column=False, help="Write a report: timings, memory, measures, versions, hashes."
@@ -230,7 +231,7 @@ class OutputOptions:
     overwrite: bool = option(default=False, column=False, help="Replace existing outputs.")
 
 
-@dataclass(frozen=True)
+@request_class
 class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOptions):
     """The request to convert one figure from its files to its outputs. Raises InputError for invalid values."""
 

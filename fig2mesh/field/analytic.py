@@ -1,6 +1,6 @@
 """Solids as formulas, functions of points: oracles for tracing, meshing and baking.
 
-After I. Quilez, "Distance functions" (https://iquilezles.org/articles/distfunctions/). Exact unless they say otherwise.
+After I. Quilez, "Distance functions" (https://iquilezles.org/articles/distfunctions/). Exact unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Distance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 def sphere(centre: Any, radius: float) -> Distance:
-    """A ball; centre : (3,) FIGURE."""
+    """Sphere; centre : (3,) FIGURE."""
     middle = np.asarray(centre, np.float64)
 
     def distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -30,11 +30,11 @@ def sphere(centre: Any, radius: float) -> Distance:
 
 
 def capsule(start: Any, end: Any, radius: float, end_radius: float | None = None) -> Distance:
-    """The hull of two balls about `start` and `end`, (3,) FIGURE; with `end_radius` a tapered limb."""
+    """Convex hull of two spheres about `start` and `end`, (3,) FIGURE; with `end_radius` a tapered capsule."""
     a, axis = np.asarray(start, np.float64), np.asarray(end, np.float64) - np.asarray(start, np.float64)
     length = float(np.linalg.norm(axis))
     taper = radius - (radius if end_radius is None else end_radius)
-    if length <= abs(taper):  # one ball holds the other
+    if length <= abs(taper):  # one sphere contains the other
         return sphere(start, radius) if taper >= 0 else sphere(end, radius - taper)
     sine = taper / length
     cosine = np.sqrt(1 - sine * sine)
@@ -43,7 +43,7 @@ def capsule(start: Any, end: Any, radius: float, end_radius: float | None = None
         offset = points - a
         along = offset @ axis / length
         away = np.sqrt(np.maximum((offset * offset).sum(axis=-1) - along * along, 0.0))
-        # the nearest point of the slanted side belongs to the ball this far along
+        # the nearest point of the slanted side belongs to the sphere this far along
         share = np.clip((along - away * sine / cosine) / length, 0, 1)
         result: NDArray[np.float64] = np.hypot(along - share * length, away) - (radius - share * taper)
         return result
@@ -52,7 +52,7 @@ def capsule(start: Any, end: Any, radius: float, end_radius: float | None = None
 
 
 def ellipsoid(centre: Any, radii: Any) -> Distance:
-    """An ellipsoid with axes along FIGURE's; approximate: exact zero level, good near it, no distance far away."""
+    """Ellipsoid with axes along FIGURE's; approximate: exact zero level, good near it, no distance far away."""
     middle, axes = np.asarray(centre, np.float64), np.asarray(radii, np.float64)
 
     def distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,7 +66,7 @@ def ellipsoid(centre: Any, radii: Any) -> Distance:
 
 
 def sample(function: Distance, part: int, centre: Any, edge: float, n: int = 64) -> PartSdf:
-    """`function` on n^3 nodes of the cube about `centre`, (3,) FIGURE."""
+    """Sample `function` on n^3 nodes of the cube about `centre`, (3,) FIGURE."""
     middle = np.asarray(centre, np.float32)
     offsets = np.linspace(-edge / 2, edge / 2, n)
     lines = [float(c) + offsets for c in middle]
@@ -94,7 +94,7 @@ MANNEQUIN: dict[str, tuple[tuple[float, float, float], tuple[float, float, float
 
 
 def mannequin_parts() -> dict[str, Distance]:
-    """The formula of each of `MANNEQUIN`'s parts; the figure is their minimum."""
+    """Formula of each of `MANNEQUIN`'s parts; the figure is their minimum."""
     return {name: capsule(start, end, first, second) for name, (start, end, first, second) in MANNEQUIN.items()}
 
 

@@ -1,4 +1,4 @@
-"""How two parts melt together."""
+"""Smooth blending of two parts."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fig2mesh.field.grids import pack
 from fig2mesh.records import PartSdf
 
 _COARSE = 24
-"""Nodes an axis of the grid that looks for a fillet."""
+"""Nodes per axis of the coarse grid on which a fillet is located."""
 
 
 def blend(first: PartSdf, second: PartSdf, radius: float, *, creases_only: bool = False) -> PartSdf | None:
-    """The fillet that a smooth minimum adds to the union of two parts, as a grid of its own; None where none is needed.
+    """Fillet that a smooth minimum adds to the union of two parts, as a grid of its own; None where none is needed.
 
-    radius : FIGURE units; surfaces nearer to each other than this melt together (polynomial smooth minimum, Quilez).
+    radius : FIGURE units; surfaces nearer to each other than this are blended (polynomial smooth minimum, Quilez).
     creases_only : less, the less the gradients of the parts differ: where two parts share a surface the plain minimum
         swells by a quarter of the radius (after Gourmel et al. 2013, "A gradient-based implicit blend")
 

@@ -1,4 +1,4 @@
-"""A body: the union of its parts' distance grids (paper §4.3, fig. 14)."""
+"""Body: union of its parts' distance grids (paper §4.3, fig. 14)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fig2mesh.records import BoolArray, ByteArray, FloatArray, IntArray, PartSdf
 
 @dataclass(frozen=True)
 class Body:
-    """The union of part fields, as a function of points.
+    """Union of part fields, as a function of points.
 
-    parts : any number of grids, each with its own place, edge and number of nodes
-    smooth : (first, second, radius) for pairs of indices into `parts` that melt together; radius in FIGURE units.
+    parts : any number of grids, each with its own position, edge and number of nodes
+    smooth : (first, second, radius) for pairs of indices into `parts` that are blended; radius in FIGURE units.
         Fillets are grids computed once, so parts not named here keep their creases and cost nothing.
     fillets : (first, second, grid), fillets made elsewhere
 
@@ -66,7 +66,7 @@ class Body:
 
     @cached_property
     def empty_space(self) -> EmptySpace:
-        """Where rays need not look; made for the first of them."""
+        """Cells that rays skip; computed at the first trace."""
         return empty_space(self.grids)
 
     @cached_property
@@ -97,7 +97,7 @@ class Body:
     def evaluate(
         self, points: Any, *, with_parts: bool = False, with_gradients: bool = False
     ) -> tuple[NDArray[np.float64], IntArray, NDArray[np.float64]]:
-        """Distance (N,), nearest part (N,) and gradient (N, 3) in one pass, float64; empty where not asked for."""
+        """Distance (N,), nearest part (N,) and gradient (N, 3) in one pass, float64; empty where not requested."""
         return evaluate(self.grids, points, with_parts=with_parts, with_gradients=with_gradients)
 
     def bounds(self) -> FloatArray:
@@ -108,12 +108,12 @@ class Body:
         return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]).astype(np.float32)
 
     def project(self, points: Any, iterations: int = 10, *, tolerance: float = 1e-5) -> tuple[FloatArray, BoolArray]:
-        """Points (N, 3), FIGURE, brought to the zero level by Newton's method; and where that succeeded, (N,) bool.
+        """Project points (N, 3), FIGURE, onto the zero level by Newton's method; return them and (N,) bool, success.
 
         tolerance : distance to the surface, estimated as value by gradient, at which a point is done, FIGURE units
 
         Steps go along the gradient and are at most a quarter of the mean part's edge, shorter when the value grew:
-        at a crease between parts the nearest part changes and a full step may jump to and fro.
+        at a crease between parts the nearest part changes and full steps may oscillate.
         """
         result = np.array(points, np.float64, order="C")
         done = np.zeros(len(result), bool)

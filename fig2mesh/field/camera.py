@@ -1,7 +1,7 @@
-"""Orthographic and perspective cameras (paper §4.3, §4.5), their rays, and images of what these meet.
+"""Orthographic and perspective cameras (paper §4.3, §4.5), their rays, and images of ray hits.
 
-Yaw turns the camera about the figure: 0 sees the front (camera at +z), 90 the figure's left side (camera at +x),
-180 the back, 270 the right side. Pitch lifts it: 90 looks straight down. Pixel centres lie at +0.5, row 0 on top.
+Yaw turns the camera about the figure: 0 shows the front (camera at +z), 90 the figure's left side (camera at +x),
+180 the back, 270 the right side. Pitch lifts it: 90 is straight down. Pixel centres lie at +0.5, row 0 on top.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ class Images(NamedTuple):
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera as numbers; its rays are those of `orthographic` or `perspective`.
+    """Camera parameters; its rays are those of `orthographic` or `perspective`.
 
     size : (width, height) in pixels; pixels are square
-    height : what the picture shows from top to bottom in the plane through `centre`, FIGURE units
+    height : extent of the picture from top to bottom in the plane through `centre`, FIGURE units
     centre : (3,) FIGURE, shown in the middle of the picture
     distance : from `centre` back to the plane where rays start (orthographic), or to the eye (perspective)
-    perspective : whether rays start at one point
+    perspective : True if rays start at one point
     """
 
     yaw_deg: float
@@ -72,7 +72,7 @@ class Camera:
 
     @property
     def start(self) -> NDArray[np.float64]:
-        """(3,) from where depths count: the eye, or the middle of the plane where rays start."""
+        """(3,) origin of depths: the eye, or the middle of the plane where rays start."""
         start: NDArray[np.float64] = np.asarray(self.centre, np.float64) + self.distance * self.axes[2]
         return start
 
@@ -110,7 +110,7 @@ class Camera:
         rows += first_row
         origin, direction = self.steps()
         varying = direction if self.perspective else origin
-        # Element by element, not as a product of matrices: a ray is the same whatever others are asked for with it.
+        # Element by element, not as a product of matrices: a ray must not depend on the others in the batch.
         along = varying[0] + columns[:, None] * varying[1] + rows[:, None] * varying[2]
         if not self.perspective:
             return along, np.broadcast_to(direction[0], along.shape)
@@ -154,9 +154,9 @@ def orthographic(
     """Parallel rays, row by row.
 
     size : (width, height) in pixels; pixels are square
-    height : what the picture shows from top to bottom, FIGURE units
+    height : extent of the picture from top to bottom, FIGURE units
     centre : (3,) FIGURE, shown in the middle of the picture
-    distance : from `centre` back to the plane where rays start, and depths count from
+    distance : from `centre` back to the plane where rays start, and depths are measured from
     rows : first and behind-last row of the picture; None: all
     """
     right, up, back = axes(yaw_deg, pitch_deg)
@@ -178,7 +178,7 @@ def perspective(
 ) -> Rays:
     """Rays from one point at `distance` from `centre`, row by row; arguments as for `orthographic`.
 
-    `height` is what the picture shows in the plane through `centre`, so the vertical field of view is
+    `height` is the extent of the picture in the plane through `centre`, so the vertical field of view is
     2 atan(height / (2 distance)), and the picture tends to the orthographic one as the distance grows.
     """
     right, up, back = axes(yaw_deg, pitch_deg)

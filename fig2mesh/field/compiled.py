@@ -1,4 +1,4 @@
-"""How kernels are compiled and spread over the processor's cores.
+"""Compilation of kernels, and their distribution over the processor's cores.
 
 Kernels release the interpreter lock and are shared out to ordinary threads. That was preferred to numba's own parallel
 loops: its `workqueue` layer, the only one present on a minimal system, ends the process when two threads call at once,
@@ -28,18 +28,18 @@ _pools: dict[tuple[int, int], ThreadPoolExecutor] = {}
 
 
 def kernel(function: Function) -> Function:
-    """Compile `function` on first use, keep the machine code on disk, let other threads run meanwhile."""
+    """Compile `function` on first use, keep the machine code on disk, release the interpreter lock."""
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
 def helper(function: Function) -> Function:
-    """As `kernel`, for functions that only other kernels call: stored with those, and quicker to compile."""
+    """As `kernel`, for functions that are called only by other kernels: stored with those, and quicker to compile."""
     bare = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)
     return cast(Function, bare(function))
 
 
 def thread_count() -> int:
-    """Threads that kernels are spread over."""
+    """Number of threads used by kernels."""
     wanted = os.environ.get(THREADS_VARIABLE, "")
     if wanted.isdigit() and int(wanted) > 0:
         return int(wanted)

@@ -1,4 +1,4 @@
-"""Distance grids in plain NumPy: how steep they are, where they are negative, and their values at points."""
+"""Distance grids in plain NumPy: slopes, bounds of the negative region, and values at points."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fig2mesh.records import FloatArray, PartSdf
 
 
 def lipschitz(grid: FloatArray, spacing: float, *, outside: bool = False) -> float:
-    """An upper bound of the slope of a grid's trilinear interpolant, exact to within its cells.
+    """Upper bound of the slope of a grid's trilinear interpolant, exact to within its cells.
 
-    grid : (a, b, c) float32, at least 2 nodes an axis; spacing : distance of nodes, in the same unit
-    outside : look only at cells that hold a positive value, as a ray does that has not met the surface yet; leaves out
+    grid : (a, b, c) float32, at least 2 nodes per axis; spacing : distance of nodes, in the same unit
+    outside : use only cells that hold a positive value, which a ray crosses before it meets the surface; leaves out
         the ridge in the middle of a limb, where bounds are loosest; 0 where there are none
 
     Inside a cell each partial derivative is a mean of the differences along the cell's four edges of that direction,
@@ -38,7 +38,7 @@ def _over_corners(values: FloatArray, axes: list[int]) -> FloatArray:
 
 
 def negative_bounds(grid: FloatArray) -> NDArray[np.float64] | None:
-    """(2, 3) box around the negative region of a grid's interpolant, in units of nodes; None where there is none.
+    """(2, 3) bounding box of the negative region of a grid's interpolant, in units of nodes; None where there is none.
 
     Exact: in a plane across an axis the interpolant is bilinear in each cell and so smallest at a node's column,
     hence the region's extent along an axis is reached on the grid lines of that axis.
@@ -72,7 +72,7 @@ def trilinear(grid: NDArray[Any], at: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def to_cube(part: PartSdf, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The nearest points of a part's cube in grid coordinates, (N, 3), and the way from there to `points`, FIGURE."""
+    """Nearest points of a part's cube in grid coordinates, (N, 3), and the vectors from there to `points`, FIGURE."""
     origin = part.centre.astype(np.float64) - float(part.edge) / 2
     at = (points - origin) / part.spacing
     inside = np.clip(at, 0, part.grid.shape[0] - 1)
@@ -80,7 +80,7 @@ def to_cube(part: PartSdf, points: NDArray[np.float64]) -> tuple[NDArray[np.floa
 
 
 def grid_distance(part: PartSdf, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) signed distance of points (N, 3), FIGURE, to one part; outside of its cube as `Body` says."""
+    """(N,) signed distance of points (N, 3), FIGURE, to one part; outside of its cube as `Body` defines it."""
     inside, away = to_cube(part, points)
     value = trilinear(part.grid, inside)
     squared = (away * away).sum(axis=1)

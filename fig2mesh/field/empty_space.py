@@ -1,4 +1,4 @@
-"""Where the grids of a body are empty, so that rays need not look there.
+"""Empty space of a body's grids, which rays skip.
 
 Only signs count. A trilinear cell whose eight corners are positive is positive throughout, so the surface lies in the
 other, occupied cells, known once for all rays. Fields that overestimate distances or jump where a drawing's outline
@@ -17,23 +17,23 @@ from scipy import ndimage
 from fig2mesh.field.compiled import helper, run_blocks, sealed
 from fig2mesh.field.grids import Grids
 
-FARTHEST = 255
+MAX_DISTANCE = 255
 
 BRICK = 4
 """Cells along the edge of a brick; `cell_index` relies on it."""
 
 
 class EmptySpace(NamedTuple):
-    """What is known of the cells of `Grids`.
+    """Distances of the cells of `Grids` from the surface, and boxes round it.
 
     free : (sum (4 m)^3,) uint8, distance in cells to the nearest occupied cell of the grid, 0 if it is one. Distances
         are the chessboard's: where the value is d > 0, all cells that differ by less than d in each index are empty.
-        Outside of the negative region's box the value is 1. The cells of a brick lie together, 64 bytes, as
-        `cell_index` says: rays then stay in one line of the cache for some steps
-    free_starts : (G,) int64, where the values of a grid begin
+        Outside of the negative region's box the value is 1. The cells of a brick lie together, 64 bytes, see
+        `cell_index`: rays then stay in one line of the cache for some steps
+    free_starts : (G,) int64, start of the values of each grid
     bricks : (K, 2, 3) float64, FIGURE, boxes that together hold all places where a ray can enter the solid: the cells
         with values of both signs, and those on a face of the cube, gathered by bricks of `BRICK` cells an edge
-    brick_starts : (G + 1,) int64, where the bricks of each grid begin
+    brick_starts : (G + 1,) int64, start of the bricks of each grid
     """
 
     free: NDArray[np.uint8]
@@ -43,7 +43,7 @@ class EmptySpace(NamedTuple):
 
 
 def empty_space(grids: Grids) -> EmptySpace:
-    """Look at all grids once; some 10 ms for each."""
+    """Find the empty cells of all grids; about 10 ms for each."""
     count = len(grids.sizes)
     lengths = (BRICK * _across(grids.sizes)) ** 3
     ends = np.cumsum(lengths)
@@ -53,7 +53,7 @@ def empty_space(grids: Grids) -> EmptySpace:
     def run(first: int, step: int) -> None:
         for g in range(first, count, step):
             if grids.boxes[g, 0, 0] <= grids.boxes[g, 1, 0]:
-                bricks[g] = _look(grids, g, free[ends[g] - lengths[g] : ends[g]])
+                bricks[g] = _measure_grid(grids, g, free[ends[g] - lengths[g] : ends[g]])
 
     run_blocks(run, count, 1)
     starts = np.cumsum([0, *(len(some) for some in bricks)])
@@ -67,18 +67,18 @@ def empty_space(grids: Grids) -> EmptySpace:
 
 
 def _across(nodes: Any) -> Any:
-    """Bricks along the edge of a grid."""
+    """Number of bricks along the edge of a grid."""
     return -(-(nodes - 1) // BRICK)
 
 
 @helper
 def cell_index(across: int, i: int, j: int, k: int) -> int:
-    """Where a grid of so many bricks an edge has cell (i, j, k), from its start in `EmptySpace.free`."""
+    """Index of cell (i, j, k) of a grid of `across` bricks per edge, from its start in `EmptySpace.free`."""
     return ((((i >> 2) * across + (j >> 2)) * across + (k >> 2)) << 6) + ((i & 3) << 4) + ((j & 3) << 2) + (k & 3)
 
 
-def _look(grids: Grids, g: int, free: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Fill in the values `free` of grid g, and return its bricks."""
+def _measure_grid(grids: Grids, g: int, free: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Fill in the distances `free` of grid g, and return its bricks."""
     n, start = int(grids.sizes[g]), int(grids.starts[g])
     box = (grids.boxes[g] - grids.origins[g]) / grids.spacings[g]
     low = np.clip(np.floor(box[0]).astype(int) - 1, 0, n - 2)
@@ -90,7 +90,7 @@ def _look(grids: Grids, g: int, free: NDArray[np.uint8]) -> NDArray[np.float64]:
     distance = ndimage.distance_transform_cdt(~occupied, "chessboard")
     across = int(_across(n))
     dense = np.ones((BRICK * across,) * 3, np.uint8)
-    dense[cells] = np.minimum(distance, FARTHEST)
+    dense[cells] = np.minimum(distance, MAX_DISTANCE)
     free[:] = dense.reshape(across, BRICK, across, BRICK, across, BRICK).transpose(0, 2, 4, 1, 3, 5).ravel()
     places = np.argwhere(occupied)
     within = filled[tuple(places.T)]

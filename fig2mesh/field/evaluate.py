@@ -21,7 +21,7 @@ def evaluate(
 ) -> tuple[NDArray[np.float64], IntArray, NDArray[np.float64]]:
     """Distance (N,), nearest part (N,) and gradient (N, 3) of the union at points (N, 3), FIGURE.
 
-    What is not asked for comes back empty. Without a grid that has a surface distances are infinite, parts -1 and
+    Outputs that are not requested are empty. Without a grid that has a surface distances are infinite, parts -1 and
     gradients zero.
     """
     points = sealed(points, np.float64)

@@ -1,6 +1,6 @@
 """Compiled kernels for values and gradients of grids and of their union; `reference` holds their NumPy twins.
 
-All arithmetic is in float64: it costs next to nothing beside the memory reads, and the twins agree to rounding.
+All arithmetic is in float64: its cost is negligible beside the memory reads, and the twins agree to rounding.
 Not tried further: an analytic gradient of the trilinear interpolant is cheaper, but jumps from cell to cell and
 shows as facets; it serves only where central differences fail.
 """
@@ -20,13 +20,13 @@ Triple = tuple[float, float, float]
 
 @helper
 def cell_of(x: float, n: int) -> int:
-    """Index of the cell (0 to n-2) that holds grid coordinate x; the outermost cells take what lies beyond."""
+    """Index of the cell (0 to n-2) that holds grid coordinate x; clamped to the outermost cells."""
     return min(int(max(x, 0.0)), n - 2)
 
 
 @helper
 def node(values: NDArray[np.float32], at: int) -> float:
-    """The value of a node; unsigned, or each look-up would first ask whether the index counts from the end."""
+    """Value of a node; the index is unsigned, which avoids a test for negative indices at each lookup."""
     return np.float64(values[np.uint64(at)])
 
 
@@ -72,7 +72,7 @@ def axis_slopes(
 
 @helper
 def slopes_at(values: NDArray[np.float32], start: int, n: int, scale: float, x: float, y: float, z: float) -> Triple:
-    """Gradient at grid coordinates of the grid of n^3 nodes that begins at `start`; scale : nodes a FIGURE unit.
+    """Gradient at grid coordinates of the grid of n^3 nodes that begins at `start`; scale : nodes per FIGURE unit.
 
     Central differences one node wide (paper appendix C), which are continuous; where they cancel, as in a limb thinner
     than a cell, the interpolant's own gradient.
@@ -99,7 +99,7 @@ def grid_gradient(grids: Grids, g: int, x: float, y: float, z: float) -> Triple:
 def cube_point(
     grids: Grids, g: int, px: float, py: float, pz: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Nearest point of grid g's cube in grid coordinates, and the way from there to the point in FIGURE units."""
+    """Nearest point of grid g's cube in grid coordinates, and the vector from there to the point in FIGURE units."""
     h = grids.spacings[g]
     last = float(grids.sizes[g] - 1)
     x, y, z = (px - grids.origins[g, 0]) / h, (py - grids.origins[g, 1]) / h, (pz - grids.origins[g, 2]) / h
@@ -152,14 +152,14 @@ def union_gradient(grids: Grids, g: int, px: float, py: float, pz: float) -> Tri
 
 @helper
 def owner_at(grids: Grids, g: int, px: float, py: float, pz: float) -> int:
-    """The part that a point of grid g belongs to; of the two parts a blend joins, the nearer."""
+    """Part that a point of grid g belongs to; of the two parts that a blend joins, the nearer one."""
     if grids.owners[g, 0] == grids.owners[g, 1]:
         return int(grids.owners[g, 0])
     best = math.inf
     owner = -1
     for side in range(2):
         x, y, z, dx, dy, dz = cube_point(grids, grids.owners[g, side], px, py, pz)
-        # outside of the cube a plain sum will do: it only has to say which part is nearer
+        # outside of the cube a plain sum will do: it only has to rank the two parts
         value = grid_value(grids, grids.owners[g, side], x, y, z) + abs(dx) + abs(dy) + abs(dz)
         if value < best:
             best = value

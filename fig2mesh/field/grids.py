@@ -1,4 +1,4 @@
-"""The grids of a body laid out for the kernels: one flat array of values and a few numbers for each grid."""
+"""Grids of a body laid out for the kernels: one flat array of values and a few numbers for each grid."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Grids(NamedTuple):
     """G grids; a named tuple, because that is what a compiled kernel can take as one argument.
 
     values : (sum n^3,) float32, FIGURE units, all grids one after the other, each in order [x, y, z]
-    starts : (G,) int64, where a grid's values begin
+    starts : (G,) int64, start of each grid's values
     sizes : (G,) int64, nodes along an edge
     origins : (G, 3) float64, FIGURE, position of node (0, 0, 0)
     spacings : (G,) float64, FIGURE units
-    boxes : (G, 2, 3) float64, FIGURE, box around the negative region, a little enlarged; (inf, -inf) if none
+    boxes : (G, 2, 3) float64, FIGURE, bounding box of the negative region, a little enlarged; (inf, -inf) if none
     owners : (G, 2) int64, the part a grid belongs to, twice; for a blend the two parts that it joins
     """
 

@@ -1,4 +1,4 @@
-"""Compiled search for the first meeting of one ray with the grids; `reference.trace_reference` is its NumPy twin."""
+"""Compiled search for the first intersection of a ray with the grids; `reference.trace_reference` is its NumPy twin."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FAR = 1e30
 
 @helper
 def first_root(c0: float, c1: float, c2: float, c3: float, tolerance: float) -> float:
-    """Smallest root of c0 + c1 s + c2 s^2 + c3 s^3 in (0, 1], given c0 > 0; 2 where there is none.
+    """Smallest root of c0 + c1 s + c2 s^2 + c3 s^3 in (0, 1], given c0 > 0; 2 if there is none.
 
     In Bernstein's form the coefficients enclose the values, and one change of sign means one root. What is left is
     settled at the extremes: between them a cubic is monotone, so that also two roots close together are found, a limb
@@ -99,13 +99,13 @@ def march(
     tolerance: float,
     max_steps: int,
 ) -> tuple[float, int]:
-    """First t in [t, end] where a grid is not positive along u + t w, infinite if nowhere; and the cells looked at.
+    """First t in [t, end] where a grid is not positive along u + t w, infinite if nowhere; and the cells visited.
 
     From an empty cell the ray goes to where it leaves the block of empty cells around it. An occupied cell is settled
     exactly, as a cubic along the ray. So every step passes at least one cell, a grazing ray cannot run out of steps,
     and no limb is thin enough to be stepped over, whatever the values are.
 
-    values, base, n : the grid's nodes and where they begin, `Grids`; free_cells, cells : the same of `EmptySpace.free`.
+    values, base, n : the grid's nodes and their start, `Grids`; free_cells, cells : the same of `EmptySpace.free`.
         Single arrays, because a record of many costs more to hand over than a step of the march
     u, w, r : start and direction in grid coordinates, and one over the direction
     """
@@ -231,11 +231,11 @@ def first_hit(
     tolerance: float,
     max_steps: int,
 ) -> tuple[float, int, int]:
-    """Smallest t at which o + t d meets one of `candidates` grids in `found`, that grid (or -1), and cells looked at.
+    """Smallest t at which o + t d meets one of `candidates` grids in `found`, that grid (or -1), and cells visited.
 
     Each grid is marched only inside of the box around its negative region, nearest box first.
 
-    order, entry, leave : (G,) room to work in
+    order, entry, leave : (G,) work arrays
     """
     rx, ry, rz = reciprocal(dx), reciprocal(dy), reciprocal(dz)
     met = 0
@@ -284,7 +284,7 @@ def unit_normal(
 ) -> tuple[float, float, float]:
     """The field's normal at grid coordinates that a ray of direction d meets; where the field is flat, -d.
 
-    values, start, n : the grid's nodes and where they begin, `Grids`
+    values, start, n : the grid's nodes and their start, `Grids`
     """
     last = float(n - 1)
     gx, gy, gz = slopes_at(

@@ -1,4 +1,4 @@
-"""Plain NumPy twins of the compiled kernels: slow, short, and what the kernels are compared with."""
+"""Plain NumPy twins of the compiled kernels: slow, short, used to test the kernels."""
 
 from __future__ import annotations
 
@@ -66,13 +66,19 @@ def trace_reference(body: Body, rays: Rays, *, tolerance: float = 1e-4, max_step
             continue
         corner = part.centre.astype(np.float64) - float(part.edge) / 2
         enter, leave = _slabs(np.clip(box + [[-1e-3], [1e-3]], 0, part.grid.shape[0] - 1) * part.spacing + corner, rays)
-        ask = np.flatnonzero((enter <= leave) & (enter < best))
+        active = np.flatnonzero((enter <= leave) & (enter < best))
         found, used = _march(
-            part, origins[ask], directions[ask], enter[ask], np.minimum(leave, best)[ask], tolerance, max_steps
+            part,
+            origins[active],
+            directions[active],
+            enter[active],
+            np.minimum(leave, best)[active],
+            tolerance,
+            max_steps,
         )
-        steps[ask] += used
-        nearer = found < best[ask]
-        best[ask[nearer]], index[ask[nearer]] = found[nearer], number
+        steps[active] += used
+        nearer = found < best[active]
+        best[active[nearer]], index[active[nearer]] = found[nearer], number
     points, normals = np.zeros((count, 3)), np.zeros((count, 3))
     hit = index >= 0
     points[hit] = origins[hit] + best[hit, None] * directions[hit]
@@ -99,7 +105,7 @@ def _slabs(box: Array, rays: Rays) -> tuple[Array, Array]:
 def _march(
     part: PartSdf, origins: Array, directions: Array, t: Array, end: Array, tolerance: float, max_steps: int
 ) -> tuple[Array, IntArray]:
-    """(N,) first t at which the part is not positive, infinite if nowhere; (N,) cells looked at."""
+    """(N,) first t at which the part is not positive, infinite if nowhere; (N,) cells visited."""
     n, h = part.grid.shape[0], part.spacing
     start = (origins - (part.centre.astype(np.float64) - float(part.edge) / 2)) / h
     speed = directions / h
@@ -145,9 +151,9 @@ def _march(
 
 
 def _first_bracket(along: Callable[[Array], Array], start: Array, stop: Array) -> tuple[Array, Array]:
-    """The first of 64 equal stretches in whose end `along` is not positive: (N,) ends, the far one infinite if none.
+    """First of 64 equal intervals at whose end `along` is not positive: (N,) ends, the far one infinite if none.
 
-    Where the compiled kernel looks at the cubic's extremes this one looks at many points: another way to the same.
+    The compiled kernel examines the cubic's extremes, this one many points: another method for the same result.
     """
     low, high = start.copy(), np.full(len(start), np.inf)
     for share in np.linspace(0, 1, 65)[1:]:

@@ -11,15 +11,15 @@ from fig2mesh.field.trace_kernel import trace_blocks
 from fig2mesh.records import Hits, Rays
 
 _BLOCK = 64
-"""Rays that are told together which boxes they can meet: a stretch of an image row."""
+"""Rays per block that share one test against the bounding boxes: a stretch of an image row."""
 
 
 def trace(body: Body, rays: Rays, *, tolerance: float = 1e-4, max_steps: int = 1024, with_normals: bool = True) -> Hits:
-    """First meeting of each ray with the body's surface.
+    """First intersection of each ray with the body's surface.
 
     tolerance : FIGURE units along the ray; the depth is at most so much short of the surface of the grids' interpolant
-    max_steps : cells looked at for each part before the ray passes it by; no straight line crosses more than 3 n, so it
-        matters only to those who want to bound the work
+    max_steps : cells visited for each part before the ray passes it by; no straight line crosses more than 3 n, so it
+        only serves to bound the work
     with_normals : False leaves the normals zero, and costs nothing for them
 
     Each part is marched only inside of the box around its negative region, nearest box first. A step goes through cells

@@ -27,9 +27,9 @@ def boxes_of_block(
 ) -> int:
     """Write to `found` the grids whose boxes some ray from `start` to `stop` may meet, and return how many.
 
-    The slab test in interval arithmetic over all rays at once: neighbouring pixels mostly see the same few boxes.
+    The slab test in interval arithmetic over all rays at once: neighbouring pixels mostly meet the same few boxes.
 
-    first, last : (G,) room to work in
+    first, last : (G,) work arrays
     """
     for g in range(grids.sizes.shape[0]):
         first[g], last[g] = 0.0, FAR
@@ -39,7 +39,7 @@ def boxes_of_block(
             o, r = np.float64(origins[ray, axis]), reciprocal(np.float64(directions[ray, axis]))
             o0, o1, r0, r1 = min(o0, o), max(o1, o), min(r0, r), max(r1, r)
         if r0 < 0.0 < r1:
-            continue  # says nothing about this axis
+            continue  # no constraint from this axis
         for g in range(grids.sizes.shape[0]):
             near, far = grids.boxes[g, 0, axis] - o1, grids.boxes[g, 1, axis] - o0
             slow, fast = r0, r1
@@ -74,7 +74,7 @@ def trace_blocks(
     normals: NDArray[np.float32],
     steps: NDArray[np.int32],
 ) -> None:
-    """Trace the blocks `first, first + step, ...` of rays; the outputs come filled with what a miss has."""
+    """Trace the blocks `first, first + step, ...` of rays; the outputs come filled with the values of a miss."""
     count = len(origins)
     total = grids.sizes.shape[0]
     entry = np.empty(total, np.float64)

@@ -20,8 +20,8 @@ from exporters.tiles.check import TILESET
 from fig2mesh.errors import InputError
 from georef.geodesy import cesium_entity_heading_deg
 from georef.untrusted.damage import DamagedFile, decoding
-from georef.untrusted.json_file import is_there, read_json
-from georef.untrusted.json_shape import Needed, check_shape
+from georef.untrusted.json_file import is_plain_file, read_json
+from georef.untrusted.json_shape import Required, check_shape
 
 Kind = Literal["model", "tileset", "czml", "geojson"]
 
@@ -165,7 +165,7 @@ def _contents(path: Path) -> Iterator[str]:
         if "implicitTiling" in tile:
             raise InputError(path, "implicit tiling is not supported", "give a tileset with explicit tiles")
         for content in [tile["content"]] if "content" in tile else tile.get("contents", []):
-            check_shape(content, {"url" if "uri" not in content else "uri": Needed(str)}, "content")
+            check_shape(content, {"url" if "uri" not in content else "uri": Required(str)}, "content")
             yield content["uri"] if "uri" in content else content["url"]  # url: 3D Tiles 0.0
         pending += tile.get("children", [])
 
@@ -217,5 +217,5 @@ def _split(uri: str) -> SplitResult:
 
 
 def _check_there(target: Path, by: Path) -> None:
-    if not is_there(target):
+    if not is_plain_file(target):
         raise InputError(by, f"needs the missing file {target.name}", "write it again, with all its files")

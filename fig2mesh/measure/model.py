@@ -172,7 +172,8 @@ def _textured(scene: Any, nodes: list[Any], path: Path) -> TexturedMesh:
         raise ExportError(path, f"{len(nodes)} meshes", "give a file with exactly one triangle mesh")
     asset_from_node, name = nodes[0]
     body = scene.geometry[name]
-    vertices = (body.vertices @ asset_from_node[:3, :3].T + asset_from_node[:3, 3]).astype(np.float32)
+    with np.errstate(invalid="ignore"):  # numbers that are not finite are refused with the mesh
+        vertices = (body.vertices @ asset_from_node[:3, :3].T + asset_from_node[:3, 3]).astype(np.float32)
     normals = body.vertex_normals @ np.linalg.inv(asset_from_node[:3, :3])
     faces = np.asarray(body.faces, np.int32)
     corner = np.arange(len(vertices))[:, None]

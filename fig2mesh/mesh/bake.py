@@ -1,9 +1,9 @@
 """Colours for the texture atlas (paper appendix C).
 
-Every texel is a point of the surface. Where the drawing sees that point, it takes the drawing's own pixel; elsewhere
-it takes the plain colours of its part, and where the drawing has contours, creases between
-limbs have the drawing's ink. Seeing is decided on the mesh itself: a ray from the point towards the viewer
-must leave freely, so that an arm in front of the chest does not smear onto it.
+Every texel is a point of the surface. Where the drawing shows that point, it takes the drawing's own pixel; elsewhere
+it takes the plain colours of its part, and where the drawing has contours, creases between limbs have its ink.
+Visibility is determined by ray casting on the mesh itself: a ray from the point towards the viewer must not be
+blocked, so that an arm in front of the chest does not smear onto it.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
 
 TURNED = -0.3
-"""Triangles turned away further than this are not seen whatever their smooth normal says."""
+"""Threshold of the z of a triangle's normal, below which it is not visible whatever its smooth normal."""
 
 LINE_REACH = 0.8
-"""How far off the surface corners are looked for, widths of the line."""
+"""Distance off the surface at which corners are detected, widths of the line."""
 
 CORNER, CORNER_SOFT = 0.6, 0.2
-"""A point lies in a corner where the distance is below this share of how far one went, by a soft step."""
+"""A point lies in a corner where the field's value is below this share of the distance stepped, by a soft threshold."""
 
 CLEARANCE = 2e-3
-"""Rays start this far off the surface, FIGURE units, so that they do not hit the face they start from."""
+"""Distance off the surface at which rays start, FIGURE units, so that they do not hit the face they start from."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def bake(
     normals : (V, 3) float32 unit normals at the vertices of `mesh.solid`
     face_parts : (F,) uint8 part label of every triangle
     size : texels along each side of the square texture
-    body : whose creases are inked where the drawing has contours; None for none
+    body : its creases are inked where the drawing has contours; None: no ink
     """
     owner, weights = rasterise(mesh.uv, mesh.faces, size)
     covered = owner >= 0
@@ -68,32 +68,33 @@ def bake(
     points = np.einsum("nk,nkd->nd", weights[covered], corners[face])
     normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
     count("texels", len(face))
-    seen = _seen(mesh.solid, face, points, normal, sources.grazing)
+    visible = _visible(mesh.solid, face, points, normal, sources.grazing)
     color = np.empty((len(face), 3))
-    color[seen] = drawn_colours(sources, frame, points[seen])
-    color[~seen] = plain_colours(sources, frame, points[~seen], normal[~seen], face_parts[face[~seen]], body)
+    color[visible] = drawn_colours(sources, frame, points[visible])
+    hidden = ~visible
+    color[hidden] = plain_colours(sources, frame, points[hidden], normal[hidden], face_parts[face[hidden]], body)
     image = np.zeros((size, size, 3), np.uint8)
     image[covered] = np.clip(np.round(color), 0, 255).astype(np.uint8)
     observed = np.zeros((size, size), np.uint8)
-    observed[covered] = np.where(seen, 255, 0)
+    observed[covered] = np.where(visible, 255, 0)
     # Padding: bilinear filtering and mipmaps reach beyond the charts.
     _, source = ndimage.distance_transform_edt(~covered, return_indices=True)
     return Baked(image[tuple(source)], observed[tuple(source)], covered)
 
 
 def drawn_faces(mesh: Mesh) -> NDArray[np.bool_]:
-    """(F,) bool: triangles that face the viewer and that nothing hides at their corners, middle and between."""
+    """(F,) bool: triangles that face the viewer and are not occluded at their corners, middle and between."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     a, b, c = (corners[:, i] for i in range(3))
     flat = np.cross(b - a, c - a)
-    seen = np.asarray(flat[:, 2] > 0)
-    face = np.tile(np.flatnonzero(seen), len(_LOOKS))
-    points = np.einsum("lk,nkd->lnd", _LOOKS, corners[seen]).reshape(-1, 3)
-    seen[seen] = _seen(mesh, face, points, flat[face]).reshape(len(_LOOKS), -1).all(axis=0)
-    return seen
+    visible = np.asarray(flat[:, 2] > 0)
+    face = np.tile(np.flatnonzero(visible), len(_SAMPLES))
+    points = np.einsum("lk,nkd->lnd", _SAMPLES, corners[visible]).reshape(-1, 3)
+    visible[visible] = _visible(mesh, face, points, flat[face]).reshape(len(_SAMPLES), -1).all(axis=0)
+    return visible
 
 
-_LOOKS = (
+_SAMPLES = (
     np.array(
         [
             [1, 1, 1],
@@ -107,17 +108,17 @@ _LOOKS = (
     )
     / np.array([3, 1, 1, 1, 2, 2, 2])[:, None]
 )
-"""Barycentric coordinates at which triangles are looked at."""
+"""Barycentric coordinates at which the visibility of triangles is tested."""
 
 
-def _seen(
+def _visible(
     mesh: Mesh,
     face: NDArray[np.integer],
     points: NDArray[np.float64],
     smooth: NDArray[np.float64],
     grazing: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """(N,) bool: points (with their smooth normals) that the viewer of the drawing, far away along +z, sees.
+    """(N,) bool: points (with their smooth normals) visible to the viewer of the drawing, far away along +z.
 
     grazing : least z of the smooth normal
     """
@@ -127,17 +128,17 @@ def _seen(
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
     flat = np.cross(b - a, c - a)
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)
-    seen = (smooth[:, 2] > grazing) & (flat[face, 2] > TURNED)
+    visible = (smooth[:, 2] > grazing) & (flat[face, 2] > TURNED)
     scene = o3d.t.geometry.RaycastingScene()
     scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
-    start = points[seen] + CLEARANCE * flat[face[seen]]
+    start = points[visible] + CLEARANCE * flat[face[visible]]
     rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
-    seen[seen] = ~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
-    return np.asarray(seen)
+    visible[visible] = ~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
+    return np.asarray(visible)
 
 
 def drawn_colours(sources: Sources, frame: ImageFrame, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) sRGB 0-255: what the drawing shows in front of points (N, 3), FIGURE."""
+    """(N, 3) sRGB 0-255: colours of the drawing in front of points (N, 3), FIGURE."""
     return _bilinear(sources.seen, frame.image_from_figure(points))
 
 
@@ -151,8 +152,8 @@ def plain_colours(
 ) -> NDArray[np.float64]:
     """(N, 3) sRGB 0-255 of points that the drawing does not show: plain areas, and ink in the creases.
 
-    points, normals : (N, 3) FIGURE; labels : (N,) of the part each lies on
-    body : whose creases are inked where the drawing has contours; None for none
+    points, normals : (N, 3) FIGURE; labels : (N,) of the part that each lies on
+    body : its creases are inked where the drawing has contours; None: no ink
     """
     pixels = frame.image_from_figure(points)
     color = np.empty((len(points), 3))
@@ -169,9 +170,9 @@ def plain_colours(
 def crease_ink(
     body: Body, points: NDArray[np.float64], normals: NDArray[np.float64], width: float
 ) -> NDArray[np.float64]:
-    """(N,) how much ink there is on points of the surface: 1 in the corner between a limb and what it touches.
+    """(N,) amount of ink on points of the surface: 1 in the corner between a limb and what it touches.
 
-    Off a flat or round surface the distance grows as fast as one goes; in a corner other surfaces are nearer.
+    Off a flat or round surface the distance grows by the distance stepped; in a corner other surfaces are nearer.
 
     width : of the line, FIGURE units
     """
@@ -182,7 +183,7 @@ def crease_ink(
 
 
 def _bilinear(picture: NDArray[np.float32], pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) colours at (N, 2) x, y in pixels with centres at +0.5; the border is continued."""
+    """(N, 3) colours at (N, 2) x, y in pixels with centres at +0.5; bilinear, extrapolated by the border."""
     x = np.clip(pixels[:, 0] - 0.5, 0, picture.shape[1] - 1)
     y = np.clip(pixels[:, 1] - 0.5, 0, picture.shape[0] - 1)
     x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
@@ -196,7 +197,7 @@ def _bilinear(picture: NDArray[np.float32], pixels: NDArray[np.float64]) -> NDAr
 def rasterise(
     uv: NDArray[np.float32], faces: NDArray[np.int32], size: int
 ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Which triangle covers each texel centre.
+    """Rasterise triangles: the one that covers each texel centre.
 
     Returns
     -------

@@ -17,7 +17,7 @@ RADII = (1.2, 2.0, 4.0)
 
 
 def ball_pivot(cloud: PointCloud, spacing: float) -> Mesh:
-    """An open mesh through the points, FIGURE.
+    """Open mesh through the points, FIGURE.
 
     spacing : least distance between the points, as given to `scan`
     """

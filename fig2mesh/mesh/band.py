@@ -1,4 +1,4 @@
-"""The cells of a grid that may hold the surface, and how finely the body must be sampled in each.
+"""Cells of a grid that may hold the surface, and the sampling density needed in each.
 
 Scanned evenly, a limb as thick as the point spacing comes out of ball pivoting with 0.38 of its volume (three spacings:
 0.88, four: 0.93), and one thinner than a cell may pass between the nodes. Drawn staffs and strings are that thin; so
@@ -18,8 +18,8 @@ from fig2mesh.mesh.newton import newton
 from fig2mesh.mesh.protocol import Field
 from fig2mesh.records import FloatArray
 
-FINEST = 0.25
-"""Least spacing relative to the one asked for."""
+MIN_SHARE = 0.25
+"""Least spacing relative to the requested one."""
 
 PER_DEPTH = 0.5
 """Spacing relative to half the thickness; a flat surface shows a depth of 2 spacings, so nothing changes there."""
@@ -28,7 +28,7 @@ PER_DEPTH = 0.5
 @dataclass(frozen=True)
 class Band:
     """cells : (C, 3) indices of the cells' lowest nodes; share : (C,) float32 in [1/4, 1], local spacing by spacing;
-    hidden : (C,) bool, no corner is inside and the body hereabouts is thinner than a cell: small values tell of it."""
+    hidden : (C,) bool, no corner is inside and the body is thinner than a cell here, as small values reveal."""
 
     cells: NDArray[np.int64]
     share: FloatArray
@@ -43,16 +43,16 @@ def band(grid: Grid) -> Band:
     near = _any_corner(grid.outside & grid.known & (np.abs(grid.values) < 0.9 * LIPSCHITZ * grid.spacing))
     cells = np.argwhere(crossing | (near & ~_any_corner(inside)))
     lowest = ndimage.minimum_filter(grid.values, size=5, mode="nearest")
-    least = np.zeros(len(cells), np.float32)
+    minimum = np.zeros(len(cells), np.float32)
     for corner in np.ndindex(2, 2, 2):
-        np.minimum(least, lowest[tuple((cells + corner).T)], out=least)
+        np.minimum(minimum, lowest[tuple((cells + corner).T)], out=minimum)
     # In lengths, where the field runs slower or faster than the distance.
-    depth = -least / np.maximum(_slope(grid, cells), 1e-3) / np.float32(grid.spacing)
+    depth = -minimum / np.maximum(_slope(grid, cells), 1e-3) / np.float32(grid.spacing)
     crossed = crossing[tuple(cells.T)]
-    # Beside a thick body the other cells lie just outside of it, and all that they could give its neighbours give.
+    # Beside a thick body the other cells lie just outside of it, and its neighbours give all points that they could.
     useful = crossed | (depth < 0.9)
     cells, depth, crossed = cells[useful], depth[useful], crossed[useful]
-    share = np.exp2(np.floor(np.log2(np.clip(PER_DEPTH * depth, FINEST, 1.0)) + 0.5)).astype(np.float32)
+    share = np.exp2(np.floor(np.log2(np.clip(PER_DEPTH * depth, MIN_SHARE, 1.0)) + 0.5)).astype(np.float32)
     return Band(cells, share, ~crossed & (depth < 0.7))
 
 
@@ -65,12 +65,13 @@ def _slope(grid: Grid, cells: NDArray[np.int64]) -> FloatArray:
         (np.abs(np.diff(values, axis=axis)) * known.min(axis=axis, keepdims=True)).max(axis=(0, 1, 2))
         for axis in range(3)
     ]
-    slope: FloatArray = np.linalg.norm(steepest, axis=0) / np.float32(grid.spacing)
+    with np.errstate(over="ignore"):  # the norm of huge values is infinite, and so is the band
+        slope: FloatArray = np.linalg.norm(steepest, axis=0) / np.float32(grid.spacing)
     return slope
 
 
 def _any_corner(nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(nx - 1, ny - 1, nz - 1): does any corner of a cell hold it?"""
+    """(nx - 1, ny - 1, nz - 1) bool: any corner of the cell is in `nodes`."""
     for axis in range(3):
         along = np.moveaxis(nodes, axis, 0)
         nodes = np.moveaxis(along[:-1] | along[1:], 0, axis)
@@ -85,7 +86,7 @@ def throw(grid: Grid, chosen: Band, each: NDArray[np.int64], random: np.random.G
 
 
 def misses_limbs(field: Field, grid: Grid) -> bool:
-    """Does a limb thinner than a cell run through cells that have no node inside?"""
+    """Whether a limb thinner than a cell runs through cells that have no node inside."""
     found = band(grid)
     hidden = Band(found.cells[found.hidden], found.share[found.hidden], found.hidden[found.hidden])
     if len(hidden.cells) == 0:

@@ -1,6 +1,6 @@
-"""Close what ball pivoting leaves open: always a closed, oriented manifold, and a report of how (paper §4.5).
+"""Closing of meshes from ball pivoting: always a closed, oriented manifold, and a report (paper §4.5).
 
-The field knows which side is out, so faces are turned by its gradient, those that still disagree are dropped, and the
+The field defines the outside, so faces are turned by its gradient, those that still disagree are dropped, and the
 holes filled; new faces may disagree again, so this repeats until all is clean, mostly once or twice.
 
 What did not work: pymeshfix closed everything and deleted 40 % of the body; trimesh.fill_holes left 132 open edges and
@@ -33,25 +33,25 @@ from fig2mesh.records import Mesh
 Method = Literal["pymeshlab", "fill"]
 
 ROUNDS = 6
-"""After so many rounds PyMeshLab is given up on and the rest is filled."""
+"""Largest number of rounds of PyMeshLab, after which the rest is filled by `fill`."""
 
 LONG_EDGE = 3.0
-"""Edges longer than this many median edges are split and bent onto the body."""
+"""Threshold, median edges, above which an edge is split and bent onto the body."""
 
 SLIVER = 0.05
-"""A component thinner on average than this many median edges is a flap closed onto itself."""
+"""Threshold of a component's mean thickness, median edges, below which it is a flap closed onto itself."""
 
 
 @dataclass(frozen=True)
 class CloseReport:
-    """How a mesh was closed.
+    """Report of closing a mesh.
 
-    method : what closed the holes; "isosurface" where the mesh was replaced as a whole
+    method : method that closed the holes; "isosurface" where the mesh was replaced as a whole
     rounds : of dropping and closing
     holes_closed : holes of all rounds together
     faces_dropped, faces_added : because they disagreed, were flaps or cavities; to close holes
     edges_split : long edges bent onto the body afterwards
-    fallback : "" or why the method asked for was not enough
+    fallback : "" or the reason why the requested method was not enough
     """
 
     method: Literal["pymeshlab", "fill", "isosurface"]
@@ -76,7 +76,7 @@ def close(
 
     Returns
     -------
-    A closed, oriented manifold whose every component has a positive volume, and how it came about. Only where `field`
+    A closed, oriented manifold whose every component has a positive volume, and the report. Only where `field`
     has no inside at all is the mesh empty.
     """
     if method not in ("pymeshlab", "fill"):
@@ -119,7 +119,7 @@ def close(
 
 
 def _drop_hollow(mesh: Mesh, thickness: float) -> Mesh:
-    """Without cavities (their volume is negative) and without flaps closed onto themselves (they have none)."""
+    """Drop cavities (of negative volume) and flaps closed onto themselves (of no volume)."""
     labels = face_components(mesh.faces)
     volumes, areas = component_volumes(mesh, labels), component_areas(mesh, labels)
     real = 2 * volumes > thickness * areas
@@ -132,6 +132,6 @@ def _replace(field: Field, spacing: float, rounds: int, reason: str) -> tuple[Me
 
 
 def _guess(field: Field) -> float:
-    """A spacing for a mesh that tells none: a two-hundredth of the body's longest side."""
+    """Default spacing for a mesh without edges: a two-hundredth of the body's longest side."""
     low, high = np.asarray(field.bounds(), np.float64)
     return float((high - low).max() / 200)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fig2mesh.errors import InputError
+from fig2mesh.errors import SYSTEM_LIBRARIES, InputError
 from fig2mesh.mesh.topology import as_mesh
 from fig2mesh.records import Mesh
 
-SYSTEM_LIBRARIES = "apt-get install -y --no-install-recommends libgl1 libegl1 libopengl0 libusb-1.0-0"
-"""Brings the system libraries that Open3D and MeshLab load."""
-
-LARGEST_HOLE = 2000
-"""Edges of the largest hole to close."""
+MAX_HOLE_EDGES = 2000
+"""Edges of the largest hole that is closed."""
 
 
-REMEDY = f"run `{SYSTEM_LIBRARIES}` (Debian), or pass --closing fill"
+REMEDY = f"run `{SYSTEM_LIBRARIES}` (Debian), or use --closing fill"
 
 
 def close_pymeshlab(mesh: Mesh) -> Mesh:
@@ -29,10 +26,10 @@ def close_pymeshlab(mesh: Mesh) -> Mesh:
     except ImportError as error:
         raise InputError("--closing pymeshlab", f"cannot be imported ({error})", REMEDY) from error
     scene = pymeshlab.MeshSet(verbose=False)
-    # Without libopengl0 the import passes, the plugins are not loaded, and filters are missing without a word.
+    # Without libopengl0 the import passes, the plugins are not loaded, and filters are missing without an error.
     if not hasattr(scene, "meshing_close_holes"):
         raise InputError("--closing pymeshlab", "its plugins could not be loaded", REMEDY)
     scene.add_mesh(pymeshlab.Mesh(mesh.vertices.astype(np.float64), mesh.faces))
-    scene.meshing_close_holes(maxholesize=LARGEST_HOLE, newfaceselected=False, selfintersection=False)
+    scene.meshing_close_holes(maxholesize=MAX_HOLE_EDGES, newfaceselected=False, selfintersection=False)
     closed = scene.current_mesh()
     return as_mesh(closed.vertex_matrix(), closed.face_matrix())

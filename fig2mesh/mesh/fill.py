@@ -1,4 +1,4 @@
-"""Close holes without PyMeshLab: each is triangulated with the least area (Barequet & Sharir 1995; Liepa 2003).
+"""Hole filling without PyMeshLab: each hole is triangulated with the least area (Barequet & Sharir 1995; Liepa 2003).
 
 Guaranteed: on an oriented manifold with boundary the result is a closed, oriented manifold. A chord that is an edge of
 the mesh already is forbidden, because it would get a third triangle; where no triangulation is left, and on very long
@@ -16,12 +16,12 @@ from fig2mesh.field.compiled import kernel
 from fig2mesh.mesh.topology import as_mesh, boundary_edges, half_edges
 from fig2mesh.records import Mesh
 
-LONGEST = 400
-"""Holes with more edges get a fan: the least area costs time with the cube of this (0.15 s here)."""
+MAX_HOLE_EDGES = 400
+"""Edges of the largest hole filled by least area, in cubic time (0.15 s at this size); larger ones get a fan."""
 
 
 def fill(mesh: Mesh) -> Mesh:
-    """Close all holes of an oriented manifold mesh; faces and vertices it had come first, unchanged."""
+    """Close all holes of an oriented manifold mesh; its own faces and vertices come first, unchanged."""
     loops = boundary_loops(mesh)
     if not loops:
         return mesh
@@ -39,7 +39,7 @@ def fill(mesh: Mesh) -> Mesh:
     for number, loop in enumerate(loops):
         corners = mesh.vertices[loop].astype(np.float64)
         triangles = np.zeros((0, 3), np.int64)
-        if len(loop) <= LONGEST:
+        if len(loop) <= MAX_HOLE_EDGES:
             taken = np.zeros((len(loop), len(loop)), np.bool_)
             first, second = place[edges[cuts[number] : cuts[number + 1]]].T
             taken[first, second] = taken[second, first] = True
@@ -55,7 +55,7 @@ def fill(mesh: Mesh) -> Mesh:
 
 
 def boundary_loops(mesh: Mesh) -> list[NDArray[np.int64]]:
-    """Holes of an oriented manifold, each as its vertices in the order in which a filling triangle runs along them."""
+    """Boundary loops of an oriented manifold, each as its vertices in the winding order of triangles that fill it."""
     edges = boundary_edges(mesh.faces)
     following = {int(b): int(a) for a, b in edges}
     if len(following) != len(edges):
@@ -73,7 +73,7 @@ def boundary_loops(mesh: Mesh) -> list[NDArray[np.int64]]:
 
 @kernel
 def _least_area(corners: Any, taken: Any) -> Any:
-    """(n - 2, 3) triangles of the polygon `corners` (n, 3) with the least area; none where every choice is taken."""
+    """(n - 2, 3) triangles of the polygon `corners` (n, 3) of least area; none if all of them use a taken edge."""
     count = len(corners)
     cost = np.full((count, count), np.inf)
     choice = np.full((count, count), -1, np.int32)

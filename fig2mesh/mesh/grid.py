@@ -1,4 +1,4 @@
-"""The body's field on a regular grid, evaluated only near the surface.
+"""Sampling of the body's field on a regular grid, evaluated only near the surface.
 
 Of a figure's box less than a tenth of the nodes lie near its surface. Blocks of 4³ nodes are judged by the value at
 their centre and evaluated only where they can hold the surface. As fields may overestimate distances, that alone could
@@ -21,18 +21,18 @@ BLOCK = 4
 """Nodes along the edge of a block."""
 
 LIPSCHITZ = 1.5
-"""Fields are trusted to overestimate distances by this factor at most; the sign check covers for worse ones."""
+"""Assumed limit of a field's overestimation of distances; the sign check covers worse ones."""
 
-MOST_NODES = 400_000_000
-"""Above this a grid asks for gigabytes, and someone mistook a unit."""
+MAX_NODES = 400_000_000
+"""Largest number of nodes; a larger grid takes gigabytes and means a wrong unit."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A sampled field.
+    """Sampled field.
 
     values : (nx, ny, nz) float32, indexed [x, y, z], negative inside, never zero; the outermost nodes are outside
-    known : (nx, ny, nz) bool, where values are the field's own; elsewhere only the sign is right
+    known : (nx, ny, nz) bool, True where values are the field's own; elsewhere only the sign is correct
     outside : (nx, ny, nz) bool, nodes connected with the space round the body: not inside and not in a cavity
     origin : (3,) float64 position of node (0, 0, 0), FIGURE
     spacing : distance between neighbouring nodes
@@ -51,8 +51,8 @@ def sample_grid(field: Field, spacing: float) -> Grid:
     low = low - 2.5 * spacing
     blocks = np.maximum(np.ceil((high - low + 2.5 * spacing) / (spacing * BLOCK)).astype(int), 1)
     shape = blocks * BLOCK
-    if not spacing > 0 or float(np.prod(shape.astype(float))) > MOST_NODES:
-        raise ValueError(f"spacing: {spacing} gives a grid of {tuple(shape)} nodes; choose a coarser one")
+    if not spacing > 0 or float(np.prod(shape.astype(float))) > MAX_NODES:
+        raise ValueError(f"spacing: {spacing} gives a grid of {tuple(shape)} nodes; use a coarser one")
     corner = np.stack(np.meshgrid(*(np.arange(n) for n in blocks), indexing="ij"), axis=-1)
     centres = low + (corner + (BLOCK - 1) / (2 * BLOCK)) * (BLOCK * spacing)
     coarse = field.distance(centres.reshape(-1, 3).astype(np.float32)).reshape(blocks)
@@ -72,14 +72,14 @@ def sample_grid(field: Field, spacing: float) -> Grid:
     for axis in range(3):
         edge = np.moveaxis(values, axis, 0)
         edge[[0, -1]] = np.maximum(edge[[0, -1]], spacing / 2)
-    # A node exactly on the surface would make triangles of no area; move it off by what no one can see.
-    least = np.float32(1e-3 * spacing)
-    values = np.where(np.abs(values) < least, np.where(values < 0, -least, least), values)
+    # A node exactly on the surface would make triangles of no area; move it by an invisible amount.
+    tiny = np.float32(1e-3 * spacing)
+    values = np.where(np.abs(values) < tiny, np.where(values < 0, -tiny, tiny), values)
     return Grid(values, known, _outside(values), low, spacing)
 
 
 def _cut_blocks(inside: BoolArray, known: BoolArray) -> BoolArray:
-    """Blocks not yet known that a sign change touches."""
+    """Blocks not yet evaluated that a sign change touches."""
     cut = np.zeros_like(known)
     for axis in range(3):
         there, back = np.moveaxis(inside, axis, 0), np.moveaxis(known, axis, 0)

@@ -1,10 +1,11 @@
-"""The second mesher, and the yardstick of the first: marching cubes of the body's field (paper §4.5 names it).
+"""Marching cubes of the body's field (paper §4.5): the alternative mesher, and the reference for ball pivoting.
 
 Lewiner's cases with a table of ambiguities give a closed manifold on nearly every grid. Where they do not, the same
 grid is cut by tetrahedra, whose cases have no ambiguity at all (`tetrahedra.py`).
 
-Why not project always: on a field with creases, full Newton steps pulled neighbouring vertices across each other and
-folded 0.1 % of the triangles; a vertex therefore moves at most a third of a cell and only where no triangle turns over.
+Vertices are not always projected: on a field with creases, full Newton steps pulled neighbouring vertices across each
+other and folded 0.1 % of the triangles; a vertex therefore moves at most a third of a cell and only where no
+triangle turns over.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from fig2mesh.records import FloatArray, Mesh
 
 HALVINGS = 2
 
-MOST_FINE_NODES = 60_000_000
-"""Largest grid to which the search for thin limbs may lead: 0.5 GB."""
+MAX_FINE_NODES = 60_000_000
+"""Nodes of the largest grid in the search for thin limbs: 0.5 GB."""
 
 
 def isosurface(field: Field, *, spacing: float, project: bool = True) -> Mesh:
-    """A closed, oriented, manifold mesh of the outer surface of `field`, FIGURE; cavities inside are filled.
+    """Closed, oriented, manifold mesh of the outer surface of `field`, FIGURE; cavities inside are filled.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ def isosurface(field: Field, *, spacing: float, project: bool = True) -> Mesh:
     """
     grid = sample_grid(field, spacing)
     for _ in range(HALVINGS):
-        if grid.values.size * 8 > MOST_FINE_NODES or not misses_limbs(field, grid):
+        if grid.values.size * 8 > MAX_FINE_NODES or not misses_limbs(field, grid):
             break
         spacing /= 2
         grid = sample_grid(field, spacing)
@@ -47,7 +48,7 @@ def isosurface(field: Field, *, spacing: float, project: bool = True) -> Mesh:
 
 
 def extract(grid: Grid) -> Mesh:
-    """The zero level of a grid, without cavities, as a closed, oriented manifold."""
+    """Zero level set of a grid, without cavities, as a closed, oriented manifold."""
     values = np.where((grid.values > 0) & ~grid.outside, -np.float32(grid.spacing), grid.values)
     if not (values < 0).any():
         return as_mesh(np.zeros((0, 3)), np.zeros((0, 3)))
@@ -66,7 +67,7 @@ def extract(grid: Grid) -> Mesh:
 
 
 def move_vertices(mesh: Mesh, target: FloatArray) -> Mesh:
-    """`mesh` with its vertices at `target` (V, 3), except those whose move would turn a triangle over."""
+    """Move the vertices of a mesh to `target` (V, 3), except where that would turn a triangle over."""
     before = face_vectors(mesh)
     vertices = np.array(target, np.float32)
     for _ in range(8):

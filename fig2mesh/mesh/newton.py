@@ -1,4 +1,4 @@
-"""The surface of a body as its field tells of it: carry points onto it, and which way is out."""
+"""Newton projection onto the zero level of a field, and outward directions."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ def newton(
     Parameters
     ----------
     points : (N, 3), FIGURE
-    tolerance : a point this close to the surface, by the field's own measure, has arrived
-    reach : points never end farther than this from where they started; a scalar or (N,)
-    iterations : at most so many steps
+    tolerance : distance from the surface, by the field's own values, at which a point has converged
+    reach : largest distance of a point from its start; a scalar or (N,)
+    iterations : largest number of steps
 
     Returns
     -------
-    (N, 3) float32 positions and (N,) bool whether each point arrived within reach. Points that did not arrive are
-    returned where they were.
+    (N, 3) float32 positions and (N,) bool, True where a point converged within reach. Other points are returned
+    unchanged.
 
-    Full Newton steps jump to and fro across a crease, where the gradient turns at once; from the fourth step on they
-    are shortened, which brings all but some 0.1 % of the points of a body to rest.
+    Full Newton steps oscillate across a crease, where the gradient changes abruptly; from the fourth step on they are
+    damped, and all but some 0.1 % of the points of a body converge.
     """
     start = np.ascontiguousarray(points, np.float32)
     current = start.copy()
@@ -57,7 +57,7 @@ def outward(field: Field, points: Points, step: float) -> FloatArray:
     """(N, 3) float32 directions out of the body at points (N, 3) of its surface, not normalised.
 
     The field's gradient; but where a part ends at a face of its grid the field jumps from below to above zero, and the
-    gradient there speaks of a surface elsewhere. Such points are told by their value, and get differences across
+    gradient there belongs to a surface elsewhere. Such points are identified by their value, and get differences across
     `step`, FIGURE units, on either side, in which the jump prevails.
     """
     points = np.ascontiguousarray(points, np.float32)

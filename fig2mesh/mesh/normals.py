@@ -10,14 +10,15 @@ from fig2mesh.mesh.topology import face_vectors
 from fig2mesh.records import FloatArray, Mesh
 
 AGREE = 0.5
-"""Cosine between the field's normal and the triangles' below which the triangles are right: creases, thin rims."""
+"""Threshold of the cosine between the field's normal and the triangles', below which the triangles' is used: creases,
+thin rims."""
 
 
 def vertex_normals(mesh: Mesh, field: Field | None = None) -> FloatArray:
     """(V, 3) float32 unit normals, FIGURE.
 
-    The triangles' normals weighted by their area; with a `field` its gradient, which knows more of a smooth body than
-    a simplified mesh does, wherever the two differ by less than 60 degrees. Never zero: a vertex without area gets +z.
+    The triangles' normals weighted by their area; with a `field` its gradient, which is more exact on a smooth body
+    than a simplified mesh, wherever the two differ by less than 60 degrees. Never zero: a vertex without area gets +z.
     """
     flat = face_vectors(mesh)
     summed: NDArray[np.float64] = np.stack(

@@ -1,12 +1,12 @@
-"""Pictures of a finished model: orthographic views of a textured mesh, cast ray by ray.
+"""Orthographic views of a finished model, rendered by ray casting.
 
-For demonstrations, contact sheets and measures (`fig2mesh.measure.model`). It looks at the exported triangles and their
-texture, not at the distance field, so it shows what a viewer of the file will show. The rays are those of
+For demonstrations, contact sheets and measures (`fig2mesh.measure.model`). It renders the exported triangles and their
+texture, not the distance field, so it shows what a viewer of the file will show. The rays are those of
 `fig2mesh.mesh.raycast`, as in `fig2mesh.render`; pixels lie on a plane in metres here, so that they can be a drawing's.
 
-Views: yaw 0 looks at the figure's front (camera at +Z of ASSET), yaw 90 at its left side (camera at +X), 180 at its
+Views: yaw 0 shows the figure's front (camera at +Z of ASSET), yaw 90 its left side (camera at +X), 180 its
 back; a positive pitch raises the camera. The plane of a view has two coordinates in metres through the ASSET origin:
-to the right as seen, and up. "VIEW" below: right as seen, up, towards the camera.
+to the viewer's right, and up. "VIEW" below: the viewer's right, up, towards the camera.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ OBSERVED, INFERRED = (58.0, 128.0, 104.0), (226.0, 142.0, 62.0)
 KEY_LIGHT = (-0.30, 0.45, 0.84)
 """VIEW; a head-light moved a little to the upper left, so that forms facing the camera still show relief."""
 RAYS_AT_ONCE = 1 << 20
-"""Some 150 MB of rays, hits and samples."""
+"""Rays per batch: about 150 MB of rays, hits and samples."""
 MARGIN = 0.04
-"""Free border of a picture, share of its height."""
+"""Margin of a picture, share of its height."""
 
 
 def view_bounds(mesh: TexturedMesh, yaw_deg: float, pitch_deg: float = 0.0) -> Bounds:
@@ -59,16 +59,16 @@ def render_mesh(
     background: Color | None = None,
     samples: int = 2,
 ) -> ByteArray:
-    """An orthographic picture of a mesh.
+    """Render an orthographic picture of a mesh.
 
     Parameters
     ----------
     mesh : ASSET
-    yaw_deg, pitch_deg : where the camera stands, see above
+    yaw_deg, pitch_deg : direction of the camera, see above
     size : (width, height) of the picture, pixels
     mode : "textured" the texture's (else the vertices') colours without shading; "clay" shaded and uncoloured;
         "normals" the VIEW normals as 127.5 (n + 1); "observed" green where the drawing showed the surface, orange
-        where it is inferred. What the mesh lacks is shown as clay.
+        where it is inferred. Attributes that the mesh lacks are shown as clay.
     bounds : left, bottom, right, top of the picture's outer edges in the view's plane, metres; None: the whole mesh
         in the middle, with a margin
     background : sRGB; None: transparent
@@ -107,13 +107,13 @@ def views_sheet(
     background: Color = LIGHT,
     samples: int = 2,
 ) -> ByteArray:
-    """The drawing and views of the model side by side, at one scale, feet on one line; several meshes in rows.
+    """Contact sheet: the drawing and views of the model side by side, at one scale, feet on one line; one mesh per row.
 
     Parameters
     ----------
     mesh : ASSET; each row has its own scale, the mesh fills its height
     drawing_rgba : (H, W, 4) or (H, W, 3) uint8, shown at the model's scale
-    mask : (H, W) bool, where the drawing shows the figure; None: where it is opaque
+    mask : (H, W) bool, the figure's silhouette; None: opaque pixels
     yaws, clay_yaws : degrees; views with texture, then views as clay
     height : pixels of a row
 
@@ -195,7 +195,7 @@ def _shade_rays(
 def _colours(
     caster: MeshCaster, hits: MeshHits, view_from_asset: NDArray[np.float64], mode: Mode
 ) -> NDArray[np.floating]:
-    """(M, 3) colours 0-255 where the mesh is met."""
+    """(M, 3) colours 0-255 at the points hit."""
     if mode == "textured":
         colours = caster.colours(hits)
         if colours is not None:
@@ -203,7 +203,7 @@ def _colours(
     normals = caster.normals(hits) @ view_from_asset.T
     if mode == "normals":
         return 127.5 * (normals + 1.0)
-    # Half-Lambert: no side of the form falls into black.
+    # Half-Lambert: no side of the form is black.
     light = 0.5 + 0.5 * (normals @ (np.array(KEY_LIGHT) / np.linalg.norm(KEY_LIGHT)))[:, None]
     shade = 0.30 + 0.75 * light**1.5
     mesh = caster.mesh
@@ -218,7 +218,7 @@ def _colours(
 def _drawing_cell(
     drawing: ByteArray, mask: NDArray[np.bool_] | None, inner: int, margin: int, background: Color
 ) -> ByteArray:
-    """The drawing, cut to the figure and scaled so that it is `inner` pixels high, on the cell's ground line."""
+    """Crop the drawing to the figure, and scale it to `inner` pixels of height, on the cell's ground line."""
     from PIL import Image
 
     shown = mask if mask is not None else (drawing[..., 3] >= 128 if drawing.shape[2] == 4 else None)
@@ -229,7 +229,7 @@ def _drawing_cell(
     image = Image.fromarray(drawing).convert("RGBA")
     scale = inner / float(rows[-1] + 1 - rows[0])
     width = max(1, round((columns[-1] + 1 - columns[0]) * scale)) + 2 * margin
-    # Bounds of the cell on the drawing; beyond the drawing's edges the background shows.
+    # Bounds of the cell on the drawing; background beyond the drawing's edges.
     left = (columns[0] + columns[-1] + 1) / 2 - width / scale / 2
     top = rows[0] - margin / scale
     box = np.rint([left, top, left + width / scale, top + cell_height / scale]).astype(int)

@@ -1,4 +1,4 @@
-"""What the mesh stage asks of a body: a signed distance and its gradient, nothing else.
+"""Interface that meshing needs of a body: a signed distance and its gradient.
 
 `fig2mesh.field.body.Body` fits, and so does any formula, which makes spheres and capsules the oracle of the tests.
 """
@@ -15,7 +15,7 @@ Points = NDArray[Any]
 
 
 class Field(Protocol):
-    """A solid as a signed distance field in FIGURE, negative inside; it may over- or underestimate the distance."""
+    """Solid as a signed distance field in FIGURE, negative inside; it may over- or underestimate the distance."""
 
     def distance(self, points: Points) -> FloatArray:
         """(N,) float32 signed distance at `points` (N, 3)."""
@@ -26,5 +26,5 @@ class Field(Protocol):
         ...
 
     def bounds(self) -> FloatArray:
-        """(2, 3) least and greatest corner of a box that holds the solid."""
+        """(2, 3) lowest and highest corner of a bounding box of the solid."""
         ...

@@ -1,4 +1,4 @@
-"""Rays cast at a finished mesh, and what its vertices and its texture say where they meet it."""
+"""Ray casting against a finished mesh, with interpolated vertex attributes and texture at the hits."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MeshHits:
-    """Where N rays meet a mesh, at M points.
+    """Hits of N rays on a mesh, at M points.
 
-    depth : (N,) along the rays; infinite where nothing is met
-    corners, weights : (M, 3) vertices of the triangles met and barycentric coordinates
+    depth : (N,) along the rays; infinite where nothing is hit
+    corners, weights : (M, 3) vertices of the triangles hit and barycentric coordinates
     """
 
     depth: NDArray[np.float32]
@@ -29,14 +29,14 @@ class MeshHits:
 
     @cached_property
     def hit(self) -> NDArray[np.bool_]:
-        """(N,) whether the mesh is met."""
+        """(N,) bool, True where the mesh is hit."""
         return np.isfinite(self.depth)
 
 
 @dataclass(frozen=True)
 class MeshCaster:
-    """A mesh in a box of unit size about the origin: single precision, in which rays are cast, then serves figures of a
-    millimetre and of a kilometre alike.
+    """Ray caster of a mesh, normalised to a box of unit size about the origin: rays are cast in single precision, which
+    then serves figures of a millimetre and of a kilometre alike.
 
     mesh : ASSET
     """
@@ -51,7 +51,7 @@ class MeshCaster:
 
     @property
     def centre(self) -> Floats:
-        """(3,) ASSET, where the origin of rays' coordinates lies."""
+        """(3,) ASSET, origin of the rays' coordinates."""
         return np.asarray(self.box.sum(axis=0) / 2)
 
     @cached_property
@@ -70,7 +70,7 @@ class MeshCaster:
         return scene
 
     def cast(self, origins: NDArray[Any], directions: NDArray[Any]) -> MeshHits:
-        """First meeting of each of N rays, (N, 3) both, with the mesh."""
+        """First intersection of each of N rays, (N, 3) both, with the mesh."""
         answer = self._scene.cast_rays(_packed(origins, directions))
         depth = answer["t_hit"].numpy()
         hit = np.isfinite(depth)
@@ -79,12 +79,12 @@ class MeshCaster:
         return MeshHits(depth, self.mesh.faces[answer["primitive_ids"].numpy()[hit]], weights)
 
     def blocked(self, origins: NDArray[Any], directions: NDArray[Any], reach: float = np.inf) -> NDArray[np.bool_]:
-        """(N,) whether rays meet the mesh within `reach`."""
+        """(N,) bool, True where rays hit the mesh within `reach`."""
         answer = self._scene.test_occlusions(_packed(origins, directions), tnear=0.0, tfar=float(reach))
         return np.asarray(answer.numpy())
 
     def normals(self, hits: MeshHits) -> Floats:
-        """(M, 3) unit normals where the mesh is met, between those of the vertices."""
+        """(M, 3) unit normals at the hits, interpolated between those of the vertices."""
         normals = interpolated(self.mesh.shading_normals, hits).astype(np.float64)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return normals
@@ -99,8 +99,8 @@ class MeshCaster:
 
 
 def interpolated(values: NDArray[Any], hits: MeshHits) -> NDArray[Any]:
-    """(M, K) what vertices have (V, K), at the points that are met."""
-    # Corner by corner: one gather of all three would need three times the memory.
+    """(M, K) barycentric interpolation of vertex attributes (V, K) at the hits."""
+    # Corner by corner: a single gather of all three would need three times the memory.
     return np.asarray(sum(hits.weights[:, k, None] * values[hits.corners[:, k]] for k in range(3)))
 
 

@@ -1,7 +1,7 @@
-"""Split long edges in the middle and carry the new vertices onto the surface.
+"""Splitting of long edges in the middle, with the new vertices projected onto the surface.
 
 A hole is filled with triangles that cut across it; this bends them back onto the body. Splitting an edge together with
-both its triangles keeps a closed manifold what it is.
+both its triangles keeps the mesh a closed manifold.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from fig2mesh.mesh.topology import as_mesh, edge_pairs, half_edges
 from fig2mesh.records import Mesh
 
 PASSES = 24
-"""Each pass splits the longest edges of separate pairs of triangles; these are enough for an edge 30 times too long."""
+"""Number of passes, each of which splits the longest edges of separate pairs of triangles; enough for an edge 30 times
+too long."""
 
 
 def refine(mesh: Mesh, field: Field, length: float) -> Mesh:

@@ -1,4 +1,4 @@
-"""What stands between the triangles of ball pivoting and an oriented manifold with holes."""
+"""Repair of the triangles of ball pivoting to an oriented manifold with holes."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from fig2mesh.records import Mesh
 PEELINGS = 10
 
 ISLAND_FACES = 50
-"""Open patches with fewer faces are suspected to be flaps."""
+"""Threshold of faces, below which an open patch may be a flap."""
 
 ISLAND_DISTANCE = 3.0
-"""A patch this many edge lengths away from everything else is a piece of the drawing, however small."""
+"""Threshold of distance, edge lengths, beyond which a patch is a piece of the drawing, however small."""
 
 
 def orient(mesh: Mesh, field: Field) -> Mesh:
@@ -43,7 +43,7 @@ def orient(mesh: Mesh, field: Field) -> Mesh:
 
 
 def drop_conflicts(mesh: Mesh) -> Mesh:
-    """Without faces that use a vertex twice, repeat another face, or share a directed edge with one.
+    """Drop faces that use a vertex twice, repeat another face, or share a directed edge with one.
 
     An edge with three faces has two in the same direction, so what remains is oriented and has manifold edges.
     """
@@ -69,7 +69,7 @@ def separate_fans(mesh: Mesh) -> Mesh:
 
     Giving each fan its own copy of the vertex, as PyMeshLab does, keeps all faces, but the copies lie in the same hole
     and filling it joins them by edges of no length: 18 triangles without area in 20,000. Copies are made only for
-    what is left after `PEELINGS` turns.
+    what is left after `PEELINGS` passes.
     """
     for _ in range(PEELINGS):
         count, fans = vertex_fans(mesh.faces)
@@ -87,7 +87,7 @@ def separate_fans(mesh: Mesh) -> Mesh:
 
 
 def split_vertices(mesh: Mesh) -> Mesh:
-    """Give each fan of triangles round a vertex a vertex of its own; positions stay, unused vertices go."""
+    """Give each fan of triangles round a vertex a vertex of its own; positions are kept, unused vertices dropped."""
     count, fans = vertex_fans(mesh.faces)
     source = np.zeros(count, np.int64)
     source[fans] = mesh.faces.reshape(-1)
@@ -95,7 +95,7 @@ def split_vertices(mesh: Mesh) -> Mesh:
 
 
 def drop_islands(mesh: Mesh) -> Mesh:
-    """Without small open patches that lie close to the rest: flaps inside creases, not pieces of the drawing."""
+    """Drop small open patches that lie close to the rest: flaps inside creases, not pieces of the drawing."""
     labels = face_components(mesh.faces)
     sizes = np.bincount(labels)
     border = np.zeros(len(mesh.vertices), np.bool_)

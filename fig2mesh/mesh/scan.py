@@ -1,8 +1,8 @@
-"""A uniform oriented point cloud of the body's outer surface (paper §4.5).
+"""Sampling of the body's outer surface as a uniform oriented point cloud (paper §4.5).
 
 The paper scans the body by sphere tracing from many views. Views alone leave 1.6 % of a figure uncovered (26 views;
-armpits, between fingers), so points thrown at random into the cells round the surface and carried onto it by Newton's
-method come on top. Cells of cavities inside the body take no part, and rays do not reach them either.
+armpits, between fingers), so random points in the cells round the surface, projected onto it by Newton's method,
+are added. Cells of cavities inside the body take no part, and rays do not reach them either.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ VIEWS: tuple[tuple[float, float], ...] = (
 )
 """Yaw and pitch of the views, degrees: front, sides and back, the diagonals from above and below, top and bottom."""
 
-MOST_PIXELS = 1024
-"""Longest side of a view; finer rays would only be thinned away again."""
+MAX_PIXELS = 1024
+"""Longest side of a view, pixels; finer rays would only be thinned again."""
 
 PER_CELL = 6
-"""Random points in each cell round the surface. At 36,000 points, 12 a cell and two rays a spacing cost twice the time
-and shrink the widest gap from 1.19 to 1.14 spacings."""
+"""Random points in each cell round the surface. At 36,000 points, 12 per cell and two rays per spacing cost twice the
+time and shrink the widest gap from 1.19 to 1.14 spacings."""
 
 
 def scan(body: Field, *, spacing: float, seed: int) -> PointCloud:
-    """Points on the outer surface, nowhere nearer to each other than `spacing` and nowhere much farther apart.
+    """Sample points on the outer surface, nowhere nearer to each other than `spacing` and nowhere much farther apart.
 
     Where the body is thinner than three spacings the points are closer, in proportion, down to a quarter (`band`).
 
@@ -70,7 +70,7 @@ def scan(body: Field, *, spacing: float, seed: int) -> PointCloud:
     points = points[thin(points, share * spacing)]
     normals = outward(body, points, spacing / 2)
     length = np.linalg.norm(normals, axis=1)
-    # Where opposite slopes cancel (the ridge of a sheet) no direction is right, and a wrong one misleads the ball.
+    # Where opposite slopes cancel (the ridge of a sheet) no direction is right, and a wrong one misleads ball pivoting.
     steep = length > 1e-3
     points, normals = points[steep], normals[steep] / length[steep, None]
     return PointCloud(points, normals, _labels(body, points))
@@ -86,9 +86,9 @@ def _share_at(points: FloatArray, grid: Grid, cells: Band) -> FloatArray:
 
 
 def _traced(body: Body, spacing: float, tolerance: float) -> FloatArray:
-    """What rays from all views meet, one ray for each spacing."""
+    """Hits of rays from all views, one ray for each spacing."""
     bounds = body.bounds()
-    side = int(np.clip(np.ceil(np.linalg.norm(bounds[1] - bounds[0]) / spacing), 16, MOST_PIXELS))
+    side = int(np.clip(np.ceil(np.linalg.norm(bounds[1] - bounds[0]) / spacing), 16, MAX_PIXELS))
     found = []
     for yaw, pitch in VIEWS:
         centre, height = framing(bounds, (side, side), yaw, pitch)

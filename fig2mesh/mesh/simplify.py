@@ -1,8 +1,8 @@
-"""Fewer triangles, the same solid (paper §4.5 textures a simplified mesh; the tool makes levels of detail as well).
+"""Mesh simplification of solids (paper §4.5 textures a simplified mesh), also for levels of detail.
 
 Measured on a 1.36 m body of 71,000 triangles: fast-simplification at aggression 3 needs 0.03 s and deviates 6e-5 m on
-average at 20,000; at 7 its edges shrink to nanometres and the mesh is no manifold any more. It stops above targets near
-1,000, where Open3D's quadric decimation goes on, at ten times the time.
+average at 20,000; at 7 its edges shrink to nanometres and the mesh is no longer a manifold. It stops above targets near
+1,000, where Open3D's quadric decimation continues, in ten times the time.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.mesh.slivers import LEAST_QUALITY, triangle_quality, without_slivers
+from fig2mesh.mesh.slivers import MIN_QUALITY, triangle_quality, without_slivers
 from fig2mesh.mesh.topology import (
     as_mesh,
     check_solid,
@@ -28,23 +28,23 @@ from fig2mesh.mesh.topology import (
 )
 from fig2mesh.records import FloatArray, Mesh
 
-LEAST = 64
-"""Triangles that every component keeps, if it has them: a small detached piece must not vanish into a tetrahedron."""
+MIN_TRIANGLES = 64
+"""Least number of triangles of a component, if it has them: a small detached piece must not become a tetrahedron."""
 
 AGGRESSION = 3.0
 
 FOLDED = -0.9
-"""Two neighbours whose normals have a smaller cosine than this lie on top of each other: one is turned over."""
+"""Threshold of the cosine between neighbours' normals, below which one lies on top of the other, turned over."""
 
 SAMPLES = 60_000
-"""Points on each of two meshes between which a deviation is measured."""
+"""Number of samples on each of two meshes for their deviation."""
 
 
 def simplify(mesh: Mesh, triangles: int) -> Mesh:
     """Reduce a closed, oriented manifold to about `triangles` triangles; components, genus and orientation stay.
 
-    Components share the budget by area, and none gets fewer than 64. Where no way of simplifying reaches a component's
-    share without breaking a law, it keeps as many triangles as it must; a mesh that is small enough keeps them all.
+    Components share the budget by area, and none gets fewer than 64. Where no method reaches a component's
+    share and keeps it a solid, it keeps as many triangles as it must; a mesh that is small enough keeps them all.
     Either way slivers are exchanged at the end (`fig2mesh.mesh.slivers`); what has none is returned as is.
     """
     if len(mesh.faces) <= triangles:
@@ -56,20 +56,20 @@ def simplify(mesh: Mesh, triangles: int) -> Mesh:
 
 
 def _improved(mesh: Mesh) -> Mesh:
-    """Without slivers, as far as that adds no fold; a mesh that is no solid is left alone."""
-    if not (triangle_quality(mesh.vertices, mesh.faces) < LEAST_QUALITY).any() or not check_solid(mesh).outward:
+    """Remove slivers, as far as that adds no fold; a mesh that is not a solid is unchanged."""
+    if not (triangle_quality(mesh.vertices, mesh.faces) < MIN_QUALITY).any() or not check_solid(mesh).outward:
         return mesh
     better = without_slivers(mesh)
     return better if _folds(better) <= _folds(mesh) else mesh
 
 
 def _budgets(areas: NDArray[np.float64], sizes: NDArray[Any], triangles: int) -> NDArray[np.int64]:
-    """(C,) triangles of each component: its share by area, but within [64, what it has]."""
-    least = np.minimum(sizes, LEAST)
-    budgets: NDArray[np.int64] = np.clip(np.floor(areas / areas.sum() * triangles), least, sizes).astype(np.int64)
+    """(C,) triangles of each component: its share by area, clamped to [64, its own number]."""
+    minimum = np.minimum(sizes, MIN_TRIANGLES)
+    budgets: NDArray[np.int64] = np.clip(np.floor(areas / areas.sum() * triangles), minimum, sizes).astype(np.int64)
     for _ in range(8):
         excess = int(budgets.sum()) - triangles
-        room = budgets - least if excess > 0 else sizes - budgets
+        room = budgets - minimum if excess > 0 else sizes - budgets
         if excess == 0 or room.sum() == 0:
             break
         change = np.minimum(np.ceil(abs(excess) * room / room.sum()).astype(np.int64), room)
@@ -130,7 +130,7 @@ def _folds(mesh: Mesh) -> int:
 
 
 def deviation(mesh: Mesh, reference: Mesh) -> tuple[float, float]:
-    """Mean and greatest distance between two surfaces, measured both ways at dense samples, in their own unit.
+    """Mean and largest distance between two surfaces, measured both ways at dense samples, in their own unit.
 
     60,000 points are spread evenly over each surface and joined by its vertices; the mean is over the even points only.
     """
@@ -151,11 +151,11 @@ def _one_way(mesh: Mesh, target: Mesh) -> tuple[float, float]:
 
 
 def spread(mesh: Mesh) -> tuple[FloatArray, NDArray[np.int64]]:
-    """(SAMPLES, 3) points spread evenly over a mesh and the (SAMPLES,) faces they lie on; always the same ones."""
+    """(SAMPLES, 3) points spread evenly over a mesh and the (SAMPLES,) faces they lie on; deterministic."""
     ends = np.cumsum(face_areas(mesh))
     step = (np.arange(SAMPLES) + 0.5) / SAMPLES
     face = np.minimum(np.searchsorted(ends, step * ends[-1]), len(ends) - 1)
-    # The plastic number's powers fill the unit square evenly (Roberts 2018), and need no generator.
+    # The plastic number's powers fill the unit square evenly (Roberts 2018), without a random generator.
     first, second = (np.arange(SAMPLES) * 0.7548776662466927) % 1, (np.arange(SAMPLES) * 0.5698402909980532) % 1
     outer = np.sqrt(first)
     weights = np.stack([1 - outer, outer * (1 - second), outer * second], axis=1)

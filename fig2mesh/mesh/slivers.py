@@ -1,4 +1,4 @@
-"""Triangles that are next to nothing, exchanged for better ones without changing the solid.
+"""Removal of slivers: triangles of almost no area are exchanged for better ones without changing the solid.
 
 Quadric decimation leaves some one to five of 20,000 triangles with a quality below 0.05. Being so few, they are worked
 on one by one in plain Python, which takes less than 0.1 s for a model of 20,000 triangles.
@@ -16,24 +16,25 @@ from numpy.typing import NDArray
 from fig2mesh.mesh.topology import as_mesh, compact
 from fig2mesh.records import Mesh
 
-LEAST_QUALITY = 0.06
-"""Triangles below are exchanged; 0.05 counts as a sliver, and rounding to a file's frame must not make one."""
+MIN_QUALITY = 0.06
+"""Quality threshold, below which triangles are exchanged; 0.05 counts as a sliver, and rounding to a file's frame must
+not make one."""
 
 REACHES = (0.005, 0.01, 0.02, 0.04)
-"""How far the surface may move where triangles are exchanged, in mean edge lengths: little is tried first.
+"""Largest movements of the surface by an exchange, in mean edge lengths: small ones are tried first.
 
 A model of 20,000 triangles has edges of 24 mm, so these are 0.1 to 1 mm, where decimation itself went up to 3 mm away.
 Held to 0.2 mm, 4 slivers in 16 models of 20,000 triangles and 6 in 16 of 5,000 remained; with 4 % of an edge, none.
 """
 
-ALIKE = 0.5
+MIN_COSINE = 0.5
 """Least cosine between the normals of a new triangle and of the surface that it replaces."""
 
-UNSURE = 0.1
-"""The normal of a triangle of a smaller quality is not relied on."""
+NORMAL_QUALITY = 0.1
+"""Quality threshold, below which the normal of a triangle is not used."""
 
 PASSES = 4
-"""For each reach: an exchange can leave a triangle that only the next one makes good."""
+"""Passes for each reach: an exchange can leave a triangle that only the next one improves."""
 
 Indices = NDArray[np.int64]
 Points = NDArray[np.float64]
@@ -41,10 +42,10 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Exchange:
-    """One way to be rid of a sliver.
+    """Exchange of triangles that removes a sliver.
 
-    old : faces that go, by number; new : (N, 3) faces that come, at most as many
-    quality : of the worst of the new ones; distance : by which the surface moves
+    old : indices of faces removed; new : (N, 3) faces added, at most as many
+    quality : of the worst of the new ones; distance : movement of the surface
     """
 
     old: Indices
@@ -61,33 +62,33 @@ def triangle_quality(vertices: NDArray[Any], faces: NDArray[Any]) -> Points:
     return np.asarray(2 * np.sqrt(3) * np.linalg.norm(np.cross(a, b), axis=1) / np.maximum(squares, 1e-300))
 
 
-def without_slivers(mesh: Mesh, least: float = LEAST_QUALITY, reaches: tuple[float, ...] = REACHES) -> Mesh:
-    """A closed, oriented manifold without triangles of a quality below `least`, wherever that can be had.
+def without_slivers(mesh: Mesh, min_quality: float = MIN_QUALITY, reaches: tuple[float, ...] = REACHES) -> Mesh:
+    """Remove triangles of a quality below `min_quality` from a closed, oriented manifold, as far as possible.
 
-    Caps lose their long edge by a flip, needles their short one by a collapse onto one of its ends; no vertex goes
+    Caps lose their long edge by a flip, needles their short one by a collapse onto one of its ends; no vertex moves
     anywhere else. An exchange is made only if the worst triangle gets better, the surface moves by at most the last of
     `reaches` (in mean edge lengths), no normal turns by more than 60 degrees and the solid keeps its pieces and
     handles: a flipped edge must be new, a collapsed one must satisfy the link condition (Dey et al. 1999). The same
     mesh is returned if there is nothing to do.
     """
-    if not (triangle_quality(mesh.vertices, mesh.faces) < least).any():
+    if not (triangle_quality(mesh.vertices, mesh.faces) < min_quality).any():
         return mesh
     patch = _Patch(mesh)
     edges = mesh.vertices[mesh.faces[:, 0]].astype(np.float64) - mesh.vertices[mesh.faces[:, 1]]
     length = float(np.linalg.norm(edges, axis=1).mean())
     for reach in (reach for reach in reaches for _ in range(PASSES)):
         values = np.where(patch.alive, triangle_quality(patch.points, patch.faces), 1.0)
-        slivers = np.argsort(values)[: int((values < least).sum())]
+        slivers = np.argsort(values)[: int((values < min_quality).sum())]
         before = patch.faces[slivers]
         for face, corners in zip(slivers.tolist(), before.tolist(), strict=True):
-            # What another exchange has changed meanwhile is judged anew in the next pass.
+            # What another exchange has changed meanwhile is evaluated again in the next pass.
             if patch.alive[face] and patch.faces[face].tolist() == corners:
-                patch.improve(face, least, reach * length)
+                patch.improve(face, min_quality, reach * length)
     return compact(as_mesh(mesh.vertices, patch.faces[patch.alive]))
 
 
 class _Patch:
-    """Faces under change, with the faces round each vertex that was asked for."""
+    """Faces being changed, with cached faces round the vertices used."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.points: Points = mesh.vertices.astype(np.float64)
@@ -98,13 +99,13 @@ class _Patch:
         self._start = np.concatenate([[0], np.cumsum(np.bincount(corners, minlength=len(mesh.vertices)))])
         self._rings: dict[int, set[int]] = {}
 
-    def improve(self, face: int, least: float, reach: float) -> None:
-        """Make the best exchange for a face, if there is one."""
+    def improve(self, face: int, min_quality: float, reach: float) -> None:
+        """Apply the best exchange for a face, if there is one."""
         ways = [way for way in (*self._flips(face), *self._collapses(face)) if way.distance <= reach]
         if not ways:
             return
         # Among exchanges that leave good triangles, the one that moves the surface least.
-        best = max(ways, key=lambda way: (min(way.quality, 2 * least), -way.distance))
+        best = max(ways, key=lambda way: (min(way.quality, 2 * min_quality), -way.distance))
         for number in best.old.tolist():
             for corner in self.faces[number].tolist():
                 self._ring(corner).discard(number)
@@ -115,7 +116,7 @@ class _Patch:
                 self._ring(corner).add(number)
 
     def _ring(self, vertex: int) -> set[int]:
-        """Numbers of the faces round a vertex."""
+        """Indices of the faces round a vertex."""
         if vertex not in self._rings:
             self._rings[vertex] = set(self._order[self._start[vertex] : self._start[vertex + 1]].tolist())
         return self._rings[vertex]
@@ -150,17 +151,17 @@ class _Patch:
                 yield from self._judged(np.concatenate([moved, [face, other]]), new)
 
     def _judged(self, old: Indices, new: Indices) -> Iterator[Exchange]:
-        """The exchange, if it makes the worst triangle better and turns no normal over."""
+        """Yield the exchange if it improves the worst triangle and turns no normal over."""
         gone = self.faces[old]
         before, after = triangle_quality(self.points, gone), triangle_quality(self.points, new)
         if after.min() <= before.min():
             return
         is_flip = len(old) == len(new)
         flat, turned = _normals(self.points, gone), _normals(self.points, new)
-        # A sliver's own normal says nothing; the triangles around it do.
-        reference = np.where(is_flip | (before[: len(new), None] < UNSURE), flat.sum(axis=0), flat[: len(new)])
+        # A sliver's own normal is unreliable; those of the triangles around it are used.
+        reference = np.where(is_flip | (before[: len(new), None] < NORMAL_QUALITY), flat.sum(axis=0), flat[: len(new)])
         lengths = np.linalg.norm(reference, axis=1) * np.linalg.norm(turned, axis=1)
-        if (np.einsum("nd,nd->n", reference, turned) <= ALIKE * lengths).any():
+        if (np.einsum("nd,nd->n", reference, turned) <= MIN_COSINE * lengths).any():
             return
         yield Exchange(old, new, float(after.min()), _apart(self.points, gone, new))
 
@@ -171,7 +172,7 @@ def _normals(points: Points, faces: Indices) -> Points:
 
 
 def _apart(points: Points, first: Indices, second: Indices) -> float:
-    """How far two small patches are from each other at their corners, the middles of edges and of triangles."""
+    """Distance between two small patches at their corners, the middles of edges and of triangles."""
     return max(_one_way(points[first], points[second]), _one_way(points[second], points[first]))
 
 

@@ -1,4 +1,4 @@
-"""A body's surface as one closed solid for each piece of the drawing, by either mesher."""
+"""Meshing of a body as one closed solid for each piece of the drawing, by either mesher."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fig2mesh.records import Mesh, PointCloud
 from fig2mesh.settings import Closing
 
 CRUMB = 0.01
-"""Components beyond the drawn pieces are dropped where they have less than this share of the surface."""
+"""Threshold, share of the surface, below which components beyond the drawn pieces are dropped."""
 
 ISOSURFACE_SPACING = 1.4
 """Grid spacing of the isosurface relative to the scan's point spacing: about as many triangles."""
@@ -23,13 +23,13 @@ ISOSURFACE_SPACING = 1.4
 
 @dataclass(frozen=True)
 class Meshing:
-    """How the solid was made.
+    """Report of meshing.
 
-    mesher : "ball-pivot" or "isosurface"; what made the mesh in the end
+    mesher : "ball-pivot" or "isosurface", whichever made the final mesh
     closing : the report of closing; None for the isosurface, which is closed from the start
     components : of the mesh
-    crumbs : components dropped because they are no piece of the drawing
-    note : "" or why the mesher asked for was not the one used
+    crumbs : components dropped because they are not a piece of the drawing
+    note : "" or the reason why the requested mesher was not used
     """
 
     mesher: str
@@ -41,7 +41,7 @@ class Meshing:
 
 @dataclass(frozen=True)
 class Solid:
-    """mesh : closed, oriented, manifold, FIGURE; how : how it came about."""
+    """mesh : closed, oriented, manifold, FIGURE; how : report of meshing."""
 
     mesh: Mesh
     how: Meshing
@@ -74,7 +74,7 @@ def _by_isosurface(body: Body, spacing: float, pieces: int, note: str) -> Solid:
 
 
 def _without_crumbs(mesh: Mesh, pieces: int) -> tuple[Mesh, int]:
-    """The mesh without components that are neither among the `pieces` largest nor large enough to matter."""
+    """Drop components that are neither among the `pieces` largest nor above `CRUMB`."""
     labels = face_components(mesh.faces)
     areas = component_areas(mesh, labels)
     if len(areas) <= pieces:

@@ -1,7 +1,7 @@
-"""Marching tetrahedra: the mesher that cannot fail.
+"""Marching tetrahedra: the fallback that cannot fail.
 
 Every cell of the grid is cut into six tetrahedra along the same diagonal (Freudenthal), so that neighbouring cells
-agree on their faces. A linear function without zeros at the nodes has a manifold for its zero level, whatever its
+agree on their faces. The zero level of a linear function without zeros at the nodes is a manifold, whatever its
 values. The price is three times the triangles, many of them thin; so it serves where marching cubes fails.
 """
 
@@ -16,7 +16,7 @@ from fig2mesh.records import FloatArray, IntArray
 
 
 def tetrahedra(values: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The zero level of a grid.
+    """Zero level set of a grid.
 
     values : (nx, ny, nz) without zeros, negative inside, positive on the outermost nodes
     Returns vertices (V, 3) float32 in units of the grid and faces (F, 3) int32, counter-clockwise from outside.

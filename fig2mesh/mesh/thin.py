@@ -1,7 +1,7 @@
-"""Thin points until none is nearer to another than a radius (Poisson-disk sampling by elimination).
+"""Poisson-disk sampling by elimination: points are dropped until none is nearer to another than a radius.
 
 Points are visited in order; one is kept unless a kept one lies within the radius. A hash grid finds the neighbours.
-Ball pivoting needs this: among clumped points the ball does not know where to roll, and leaves hundreds of holes.
+Ball pivoting needs this: among clumped points it leaves hundreds of holes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fig2mesh.field.compiled import kernel
 
 
 def thin(points: NDArray[Any], radius: float | NDArray[Any]) -> NDArray[np.int64]:
-    """Indices, ascending, of the points to keep.
+    """Indices, ascending, of the points that are kept.
 
     points : (N, 3); radius : of all points or (N,) of each. Two points are too near to each other when closer than the
     smaller of their radii: no two kept ones are, and every other point is to a kept one before it.

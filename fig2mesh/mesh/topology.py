@@ -1,7 +1,7 @@
-"""Edges, fans and components of meshes on their way to a solid, for those who repair and simplify them.
+"""Edges, fans and components of meshes, for repair and simplification.
 
-Whether a mesh is a solid is checked by `exporters.solid.measure_topology` alone; `check_solid` asks it. What is here
-labels what it counts, and also connects triangles over edges with a third one. Corner `3f + k` is the k-th corner of
+Whether a mesh is a solid is checked by `exporters.solid.measure_topology` alone; `check_solid` calls it. The functions
+here label what it counts, and also connect triangles over edges with a third one. Corner `3f + k` is the k-th corner of
 face f, half-edge `3f + k` the directed edge that leaves it.
 """
 
@@ -34,7 +34,7 @@ def edge_keys(edges: Indices, count: int, directed: bool = False) -> Indices:
 
 
 def edge_pairs(faces: Indices) -> tuple[Indices, Indices]:
-    """Half-edges that share an undirected edge, as two arrays of equal length; a third one is paired as well."""
+    """Pairs of half-edges that share an undirected edge, as two arrays of equal length; a third one is paired too."""
     edges = half_edges(faces)
     keys = edge_keys(edges, int(faces.max(initial=0)) + 1)
     order = np.argsort(keys, kind="stable")
@@ -59,7 +59,7 @@ def vertex_fans(faces: Indices) -> tuple[int, Indices]:
     first, second = edge_pairs(faces)
     corners = faces.reshape(-1)
     after = np.arange(len(corners)) // 3 * 3 + (np.arange(len(corners)) + 1) % 3
-    # Neighbours normally run along their edge in opposite directions; the others are met on the way to repair.
+    # Neighbours normally run along their edge in opposite directions; the others occur during repair.
     opposed = corners[first] == corners[after[second]]
     start = np.where(opposed, after[second], second)
     end = np.where(opposed, second, after[second])
@@ -101,17 +101,17 @@ def face_vectors(mesh: Mesh) -> NDArray[np.float64]:
 
 
 def check_solid(mesh: Mesh) -> Topology:
-    """Whether a mesh is a solid, of how many pieces and handles, and how large; volumes in FIGURE units cubed."""
+    """Topology of a mesh: closedness, pieces, handles and volume; volumes in FIGURE units cubed."""
     return measure_topology(mesh.vertices, mesh.faces)
 
 
 def as_mesh(vertices: NDArray[Any], faces: NDArray[Any]) -> Mesh:
-    """A `Mesh` from arrays of any precision."""
+    """Make a `Mesh` from arrays of any precision."""
     return Mesh(vertices.astype(np.float32), faces.astype(np.int32))
 
 
 def compact(mesh: Mesh) -> Mesh:
-    """The same mesh without vertices that no face uses."""
+    """Drop vertices that no face uses."""
     used, inverse = np.unique(mesh.faces, return_inverse=True)
     if len(used) == len(mesh.vertices):
         return mesh
@@ -119,12 +119,12 @@ def compact(mesh: Mesh) -> Mesh:
 
 
 def select_faces(mesh: Mesh, keep: NDArray[np.bool_]) -> Mesh:
-    """The faces where `keep` (F,) holds, with the vertices they use."""
+    """Select the faces where `keep` (F,) holds, with the vertices they use."""
     return compact(as_mesh(mesh.vertices, mesh.faces[keep]))
 
 
 def join(meshes: list[Mesh]) -> Mesh:
-    """Several meshes as one, in order, without merging vertices."""
+    """Concatenate meshes, in order, without merging vertices."""
     if not meshes:
         return as_mesh(np.zeros((0, 3)), np.zeros((0, 3)))
     offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])

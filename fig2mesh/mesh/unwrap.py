@@ -1,4 +1,4 @@
-"""Cut a solid into charts and pack them into one square texture.
+"""Texture coordinates: a solid is cut into charts, which are packed into one square texture.
 
 xatlas, 20,000 triangles: 0.8 s with `max_cost` 1, 2 s with its default of 2, for 180 charts instead of 140 and the same
 stretch. Its time grows faster than the mesh (60,000: 7 s), so larger meshes are handed over in patches (3 s), which
@@ -19,28 +19,29 @@ from fig2mesh.records import BoolArray, Mesh, UvMesh
 MAX_COST = 1.0
 """Cost at which a chart stops growing."""
 
-PATCH = 8_000
-"""Triangles of the largest patch that xatlas gets in one piece."""
+MAX_PATCH = 8_000
+"""Triangles of the largest patch given to xatlas in one piece."""
 
 ESTIMATE = 0.78
-"""xatlas takes the size of a texture as a wish and exceeds it by a quarter; asked for this share it about fits."""
+"""Share of the size that is requested of xatlas, which exceeds the requested size by a quarter; with it, charts about
+fit."""
 
 FILL = 0.62
 """Share of a texture that charts of figures fill."""
 
-DRAWN_SHARE = 0.6
-"""Largest share of that for what the drawing shows."""
+MAX_DRAWN_SHARE = 0.6
+"""Largest share of that for the observed surface."""
 
-LEAST_DENSITY = 0.45
-"""Least density of the rest, texels a unit of length, relative to what the drawing shows."""
+MIN_DENSITY = 0.45
+"""Least density of the rest, texels per unit of length, relative to the observed surface."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What the drawing shows of a mesh.
+    """Part of a mesh that the drawing shows.
 
-    faces : (F,) bool, triangles that it shows whole
-    pixels : (V, 2) float64, where the vertices are in it, pixels, y down
+    faces : (F,) bool, triangles that are wholly visible
+    pixels : (V, 2) float64, positions of the vertices in the drawing, pixels, y down
     """
 
     faces: BoolArray
@@ -55,13 +56,13 @@ def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4, drawn: Drawn | No
     mesh : FIGURE (any unit will do)
     texture_size : texels along each side of the square texture
     padding : least distance between charts, texels; less only where tens of charts are to fit into a tiny texture
-    drawn : what the drawing shows lies in the texture as in the drawing, pixel on texel where the texture is large
-        enough, and the rest at no more texels for a unit of length; None: nothing is drawn
+    drawn : the visible part lies in the texture as in the drawing, one texel per pixel where the texture is large
+        enough, and the rest has no more texels per unit of length; None: nothing is drawn
 
     Returns
     -------
-    A `UvMesh` whose charts have the same number of texels for a unit of length in both directions and, but for what is
-    drawn, everywhere, do not overlap, and are nowhere mirrored: the picture shows the surface as it looks from outside.
+    A `UvMesh` whose charts have the same number of texels per unit of length in both directions and, except what is
+    drawn, everywhere, do not overlap, and are not mirrored: the texture shows the surface as viewed from outside.
     Charts smaller than a texel are enlarged to one.
     """
     if texture_size < 16 or padding < 0:
@@ -78,14 +79,14 @@ def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4, drawn: Drawn | No
         scale = texture_size / max(size)
         if scale * (padding + 1) >= padding:
             break
-        # Padding takes a larger share of small textures than the estimate knows.
+        # Padding takes a larger share of small textures than the estimate assumes.
         wish *= scale
     uv = np.clip(_upright(texels, max(size)) / max(size), 0.0, 1.0).astype(np.float32)
     return UvMesh(mesh, faces.astype(np.int32), source.astype(np.int32), uv, (texture_size, texture_size))
 
 
 def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> UvMesh | None:
-    """Charts as the drawing has them, and charts of the rest, packed together; None where they do not fit."""
+    """Pack charts laid out as in the drawing together with charts of the rest; None where they do not fit."""
     indices, local = _part(mesh, drawn.faces)
     pixels = drawn.pixels[indices]
     rest = _part(mesh, ~drawn.faces)
@@ -93,7 +94,7 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
     area = float(_flat_areas(pixels, local).sum())
     usable = FILL * texture_size**2
     longest = float(np.ptp(pixels, axis=0).max())
-    scale = min(1.0, math.sqrt(DRAWN_SHARE * usable / max(area, 1e-9)), (texture_size - 4 * padding - 4) / longest)
+    scale = min(1.0, math.sqrt(MAX_DRAWN_SHARE * usable / max(area, 1e-9)), (texture_size - 4 * padding - 4) / longest)
     units = math.sqrt(area / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
     layout = None
     if len(rest[1]):
@@ -111,7 +112,7 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
         placed = _place(charts, texture_size, padding + 1)
         if placed is not None:
             break
-        if layout is not None and factor * lengths > LEAST_DENSITY * units:
+        if layout is not None and factor * lengths > MIN_DENSITY * units:
             factor *= 0.92
         else:
             scale *= 0.92
@@ -151,9 +152,9 @@ def _flat_areas(points: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArra
 def _place(
     charts: list[tuple[NDArray[np.float64], NDArray[np.int64]]], resolution: int, padding: int
 ) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]] | None:
-    """Layouts (positions in texels, faces) with their charts moved to where they fit; None where they do not.
+    """Layouts (positions in texels, faces) with their charts moved so that they fit; None where they do not.
 
-    Charts move by whole texels and are not scaled: xatlas widens them to whole texels, so its places alone are taken.
+    Charts move by whole texels and are not scaled: xatlas widens them to whole texels, so only its positions are used.
     """
     import xatlas
 
@@ -173,11 +174,11 @@ def _place(
     result = []
     for number, (positions, faces) in enumerate(charts):
         vertex, _, uv = atlas[number]
-        # Charts are numbered through all layouts.
+        # Charts are numbered across all layouts.
         _, chart = np.unique(np.asarray(atlas.get_mesh_vertex_assignment(number)[1]), return_inverse=True)
         found, before = uv.astype(np.float64) * size, positions[vertex]
         low, start = _lowest(found, chart), _lowest(before, chart)
-        # What does not fit xatlas shrinks, without a word.
+        # xatlas silently shrinks what does not fit.
         if (-_lowest(-found, chart) - low < -_lowest(-before, chart) - start - 0.5).any():
             return None
         moved = before + np.round(low - start)[chart]
@@ -191,7 +192,7 @@ def _place(
 
 
 def _lowest(points: NDArray[np.float64], chart: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(C, 2) least coordinates of the points of each chart."""
+    """(C, 2) lowest coordinates of the points of each chart."""
     result = np.full((int(chart.max()) + 1, 2), np.inf)
     np.minimum.at(result, chart, points)
     return result
@@ -224,7 +225,7 @@ def _pack(
     packing.resolution = resolution
     atlas.generate(charts, packing)
     if atlas.atlas_count != 1:
-        raise RuntimeError(f"xatlas: made {atlas.atlas_count} textures instead of one; choose a larger texture")
+        raise RuntimeError(f"xatlas: made {atlas.atlas_count} textures instead of one; use a larger texture")
     size = (int(atlas.width), int(atlas.height))
     faces = np.empty((len(mesh.faces), 3), np.int64)
     source, texels, count = [], [], 0
@@ -239,7 +240,7 @@ def _pack(
 
 def _patches(middles: NDArray[np.float32], faces: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     """Halve `faces` across their longest extent until no patch is too large."""
-    if len(faces) <= PATCH:
+    if len(faces) <= MAX_PATCH:
         return [faces]
     chosen = middles[faces]
     order = np.argsort(chosen[:, np.ptp(chosen, axis=0).argmax()], kind="stable")

@@ -1,1 +1,1 @@
-"""The networks, one a file; torch is imported here and in `fig2mesh.training` when they are used, never before."""
+"""Neural networks, one per file; torch is imported here and in `fig2mesh.training` on first use, never before."""

@@ -1,14 +1,14 @@
-"""A part network's field on a grid, coarse to fine.
+"""Evaluation of a part network's field on a grid, coarse to fine.
 
 Every fourth node is evaluated, then every second and every one, but only in cells that can hold the surface or come
-within `band` node spacings of it: a distance field changes by at most L a unit, so a cell whose corners are all
+within `band` node spacings of it: a distance field changes by at most L per unit, so a cell whose corners are all
 further than L half diagonals from zero has none. L is measured in each cell's neighbourhood, with a reserve. What
 remains is interpolated: its sign is certain as far as L is, and it is further than `band` spacings from the surface.
 
-Measured with the shipped networks on the 14 parts of a drawing, 64 nodes an edge, two cores: 21 % of the nodes
+Measured with the shipped networks on the 14 parts of a drawing, 64 nodes per edge, two cores: 21 % of the nodes
 evaluated, 3.0 s; every node 13.0 s.
 
-Local features depend on (x, y) only: their share of the decoder's first layer is computed once a pixel of the grid.
+Local features depend on (x, y) only: their share of the decoder's first layer is computed once per pixel of the grid.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from fig2mesh.skeleton import MIRRORED, PART_KIND
 STRIDES: Final = (4, 2, 1)
 BAND: Final = 0.0
 """Nodes within this many node spacings of the surface are always evaluated."""
-LEAST_SLOPE: Final = 1.2
-"""A field steeper than this is expected of no trained network, but measured; a flatter one is not trusted."""
+MIN_SLOPE: Final = 1.2
+"""Least bound of a field's slope; steeper ones are measured, flatter ones are not trusted."""
 RESERVE: Final = 1.25
-"""Slope between coarse nodes → bound of the slope anywhere."""
+"""Safety factor from the slope between coarse nodes to the bound of the slope anywhere."""
 ROWS: Final = 8192
-"""Points a time: the decoder's sums stay in the processor's cache."""
+"""Points per batch: the decoder's sums stay in the processor's cache."""
 
 
 class Decoded(NamedTuple):
-    """grid : (n, n, n) float32 [x, y, z], PART units, negative inside; evaluated : points asked of the network."""
+    """grid : (n, n, n) float32 [x, y, z], PART units, negative inside; evaluated : points, by the network."""
 
     grid: NDArray[np.float32]
     evaluated: int
@@ -50,7 +50,7 @@ def decode(net: Disn, mask: NDArray[np.bool_], anchors: NDArray[np.floating], no
 def decode_counted(
     net: Disn, mask: NDArray[np.bool_], anchors: NDArray[np.floating], nodes: int = 64, band: float = BAND
 ) -> Decoded:
-    """`decode`, and how many points it asked for; band : node spacings about the surface without interpolation."""
+    """`decode` with the number of evaluated points; band : node spacings about the surface without interpolation."""
     with torch.inference_mode():
         return _refined(_Field(net, _features(net, mask, anchors), nodes), band)
 
@@ -58,7 +58,7 @@ def decode_counted(
 def decode_dense(
     net: Disn, mask: NDArray[np.bool_], anchors: NDArray[np.floating], nodes: int = 64, *, plain: bool = False
 ) -> NDArray[np.float32]:
-    """`decode` of every node; plain : by concatenated features, without any of the short cuts."""
+    """`decode` of every node; plain : by concatenated features, without optimisations."""
     with torch.inference_mode():
         field = _Field(net, _features(net, mask, anchors), nodes, plain)
         indices = np.arange(nodes**3)
@@ -74,7 +74,7 @@ def decode_many(
 
     nets : networks by kind
     parts : by label the (64, 64) mask and the anchors (A, 3) PART, as they are in the figure, in the order of
-        `anchor_joints`; right parts go through the mirror to their network and back
+        `anchor_joints`; right parts are mirrored for their network and back
     """
     grids: dict[int, NDArray[np.float32]] = {}
     for label, (mask, anchors) in parts.items():
@@ -157,7 +157,7 @@ def _flat(nodes: int, chosen: NDArray[np.bool_], axis: NDArray[np.int64]) -> NDA
 
 
 def _eight(values: NDArray[np.float32]) -> list[NDArray[np.float32]]:
-    """Eight views: the corners of all cells."""
+    """Eight array views: the corners of all cells."""
     ends = (slice(None, -1), slice(1, None))
     return [values[a, b, c] for a in ends for b in ends for c in ends]
 
@@ -196,7 +196,7 @@ def _slopes(values: NDArray[np.float32], place: NDArray[np.floating]) -> NDArray
         for into, other in zip(_halves(widened, axis), (upper, lower), strict=True):
             np.maximum(into, other, out=into)
         squared = widened
-    return np.maximum(np.float32(LEAST_SLOPE), np.float32(RESERVE) * np.sqrt(squared))
+    return np.maximum(np.float32(MIN_SLOPE), np.float32(RESERVE) * np.sqrt(squared))
 
 
 def _halves(values: NDArray[np.float32], axis: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -2,12 +2,12 @@
 
 Of the first decoder layer's inputs the global and pose features are the same for all points of a part, and the local
 ones are bilinear in five small maps. The layer is linear, so `query` multiplies each of them where it is smallest:
-constants once a part, the three coarse maps once a map pixel, and only encoded points and two fine maps once a point.
+constants once per part, the three coarse maps once per map pixel, encoded points and two fine maps once per point.
 `query_plain` concatenates everything as appendix A draws it; both are the same function of the same parameters.
 
-What did not work: one decoder, half as wide, with points in the bone's frame and distances told from a capsule. It took
-250 samples a second instead of 170, and yet after 5.5 minutes on one core, against 4 of two streams with pose points,
-its hands were 6.5 points of IoU worse: 37.6 % against 44.1 %, held out.
+What did not work: one decoder, half as wide, with points in the bone's frame and distances from a capsule. It was
+trained on 250 samples per second instead of 170, and yet after 5.5 minutes on one core, against 4 of two streams with
+pose points, its hands were 6.5 points of IoU worse: 37.6 % against 44.1 %, held out.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ VARIANTS: Final = {
 
 @dataclass(frozen=True)
 class DisnShape:
-    """Which part a network is for, and which of `VARIANTS` it is."""
+    """Kind of part and variant (of `VARIANTS`) of a network."""
 
     kind: str
     streams: int = 2
@@ -75,15 +75,15 @@ class DisnShape:
 
     @property
     def anchors(self) -> int:
-        """Pose points."""
+        """Number of pose points."""
         return len(ANCHORS[self.kind])
 
 
 class Features(NamedTuple):
-    """What a network knows of B parts before it sees a point.
+    """Features of B parts, computed before any point is queried.
 
     maps : five (B, C, h, w), C = `FILTERS`; overall : (B, 256); pose : (B, A * 128), A = 0 without pose points
-    constants : one a stream (B, 512): the first decoder layer's share of what is the same for all points, with bias
+    constants : one per stream (B, 512): the first decoder layer's share of what is the same for all points, with bias
     """
 
     maps: tuple[Tensor, ...]
@@ -168,7 +168,7 @@ class Disn(nn.Module):
     def query(self, features: Features, points: Tensor, local: Tensor | None = None) -> Tensor:
         """(B, N) signed distances at points (B, N, 3), cheaply.
 
-        local : (B, N, 512) the first layer's share of local features, where a caller kept `local_share` of the pixels
+        local : (B, N, 512) the first layer's share of local features, cached by the caller from `local_share`
         """
         encoded = self.point(points)
         distances = []
@@ -214,7 +214,7 @@ def as_input(masks: NDArray[np.bool_]) -> Tensor:
 
 
 def _start(layer: nn.Module) -> None:
-    """He's initial values: by PyTorch's own the mask fades on its way through ten convolutions.
+    """He initialisation: with PyTorch's default the mask fades through ten convolutions.
 
     Hands, 240 steps: mean error 0.069 PART units, with PyTorch's 0.088.
     """
@@ -251,7 +251,7 @@ def _sampled(features: Features, points: Tensor) -> Tensor:
 
 
 def _local_table(stream: Stream, features: Features) -> Tensor:
-    """(B, 24 + 84, 512) what `_sampled` is multiplied by: weights of the fine maps, products of the coarse ones."""
+    """(B, 24 + 84, 512) factor of `_sampled`: weights of the fine maps, products of the coarse ones."""
     weights = torch.split(stream.share("local"), list(FILTERS), 1)
     fine = torch.cat(weights[:FINE], 1).t().expand(len(features.overall), -1, -1)
     coarse = [
@@ -262,7 +262,7 @@ def _local_table(stream: Stream, features: Features) -> Tensor:
 
 
 def _bilinear(maps: Tensor, points: Tensor) -> Tensor:
-    """(B, N, C) maps (B, C, h, w) at the (x, y) of points (B, N, 3); beyond pixel centres the border goes on."""
+    """(B, N, C) maps (B, C, h, w) at the (x, y) of points (B, N, 3), extrapolated beyond the pixel centres."""
     place = torch.stack([points[..., 0], -points[..., 1]], -1)[:, None]
     with torch.autocast(maps.device.type, enabled=False):
         values = F.grid_sample(maps, place, mode="bilinear", padding_mode="border", align_corners=False)

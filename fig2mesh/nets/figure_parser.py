@@ -1,7 +1,7 @@
-"""From a picture of one figure to its silhouette, part labels and joints.
+"""Network from a picture of one figure to its silhouette, part labels and joints.
 
 The encoder has the layers of BlazePose "full" (MobileNetV2's inverted residuals, no normalisation), so that its
-weights may be the start of training; the decoder is a U-Net's. One crop of 192 × 192 takes some 30 ms on one core.
+weights can initialise the training; the decoder is a U-Net's. One crop of 192 × 192 takes some 30 ms on one core.
 
 Sources: Sandler et al. 2018, "MobileNetV2"; Bazarevsky et al. 2020, "BlazePose"; Ronneberger et al. 2015, "U-Net".
 """
@@ -19,19 +19,19 @@ from fig2mesh.nets.weights import WeightsFile
 from fig2mesh.skeleton import JOINT_NAMES, PART_NAMES
 
 INPUT: Final = 192
-"""Pixels a side of the picture that goes in; other multiples of 32 work, at other sizes of figures than trained on."""
+"""Pixels per side of the input picture; other multiples of 32 work, at other sizes of figures than trained on."""
 
 HEAT: Final = INPUT // 4
-"""Cells a side of a joint's heat map."""
+"""Cells per side of a joint's heat map."""
 
 MASK: Final = INPUT // 2
-"""Pixels a side of silhouette and labels."""
+"""Pixels per side of silhouette and labels."""
 
 JOINTS, LABELS = len(JOINT_NAMES), len(PART_NAMES)
 
 
 class Parsed(NamedTuple):
-    """What the network says of N crops.
+    """Output of the network for N crops.
 
     silhouette : (N, 96, 96) logits; labels : (N, 18, 96, 96) logits of `PART_NAMES`
     heat : (N, 21, 48, 48) logits, a softmax over the cells of each joint's map; visible : (N, 21) logits
@@ -54,7 +54,7 @@ SHIPPED: Final = FigureParserShape()
 
 
 class Depthwise(nn.Conv2d):
-    """A convolution of each channel by itself, in single precision: CPUs are slow at others in bfloat16."""
+    """Depthwise convolution, in single precision: in bfloat16 it is slow on CPUs."""
 
     def __init__(self, channels: int, size: int, stride: int = 1) -> None:
         super().__init__(channels, channels, size, stride, size // 2, groups=channels)
@@ -80,7 +80,7 @@ class Widened(nn.Module):
 
 
 class Side(nn.Module):
-    """Filtered by channel, then 1 × 1: what goes from a stage of the encoder to the pyramid."""
+    """Lateral connection from a stage of the encoder to the pyramid: depthwise, then 1 × 1 convolution."""
 
     def __init__(self, inputs: int, outputs: int = 48) -> None:
         super().__init__()
@@ -150,7 +150,7 @@ class FigureParser(nn.Module):
             if isinstance(module, nn.Conv2d) and not name.startswith("encoder"):
                 nn.init.kaiming_normal_(module.weight, nonlinearity="relu" if name.startswith("up") else "linear")
                 nn.init.zeros_(module.bias)  # type: ignore[arg-type]
-        # Training starts with what the encoder's pyramid says alone.
+        # Training starts with the output of the encoder's pyramid alone.
         for head in (self.heat, self.visible, self.masks):
             nn.init.zeros_(head.weight)
             nn.init.zeros_(head.bias)  # type: ignore[arg-type]

@@ -1,8 +1,8 @@
-"""Heads of unseen sides: the two-branch autoencoder of paper §4.4, figure 9.
+"""Heads of sides that are not observed: the two-branch autoencoder of paper §4.4, figure 9.
 
 A shallow branch cleans hue and saturation (a denoising autoencoder after Gondara 2016), a deep one with a bottleneck
-makes the value; texture coordinates tell both which way the head faces. Hue and saturation are one point of the colour
-disc, (s cos h, s sin h), so that red has no jump.
+makes the value; texture coordinates give both the direction in which the head faces. Hue and saturation are one point
+of the colour disc, (s cos h, s sin h), so that red has no jump.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from torch.nn import functional
 from fig2mesh.nets.weights import WeightsFile
 
 SIZE: Final = 64
-"""Pixels of an edge."""
+"""Pixels per edge."""
 
 CHANNELS: Final = 6
-"""Colour disc (2), value, texture coordinates (2), whether there is head (1)."""
+"""Colour disc (2), value, texture coordinates (2), mask of the head (1)."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class HeadHsv(nn.Module):
         )
         self.value = nn.Sequential(_conv(f + CHANNELS, f), nn.Conv2d(f, 1, 3, 1, 1))
         for layer in (self.shallow[-1], self.value[-1]):
-            # Training starts at heads as they are.
+            # Training starts from the identity.
             for parameter in layer.parameters():
                 nn.init.zeros_(parameter)
 
@@ -101,7 +101,7 @@ def disc_value(rgb: Tensor) -> Tensor:
 
 
 def rgb_of(disc: Tensor) -> Tensor:
-    """(N, 3, ...) sRGB 0-1 of points of the disc and values; what lies outside of it is brought to its rim."""
+    """(N, 3, ...) sRGB 0-1 of points of the disc and values; points outside of it are clamped to its rim."""
     x, y, value = disc.unbind(dim=1)
     saturation = torch.hypot(x, y).clamp_max(1)
     sixth = torch.atan2(y, x) / (math.pi / 3)
@@ -114,7 +114,7 @@ def rgb_of(disc: Tensor) -> Tensor:
 
 
 def head_inputs(rgb: Tensor, uv: Tensor, there: Tensor) -> Tensor:
-    """(N, 6, H, W) what the network takes.
+    """(N, 6, H, W) input of the network.
 
     rgb : (N, 3, H, W) 0-1; uv : (N, 2, H, W); there : (N, H, W) bool
     """
@@ -123,9 +123,9 @@ def head_inputs(rgb: Tensor, uv: Tensor, there: Tensor) -> Tensor:
 
 
 def enhance(net: HeadHsv, rgb: Tensor, uv: Tensor, head: Tensor) -> Tensor:
-    """(N, 3, H, W) pictures whose heads the network has made anew.
+    """(N, 3, H, W) pictures with heads replaced by the network's.
 
-    rgb, uv : pictures of sides; head : (N, H, W) bool, where they show a head
+    rgb, uv : pictures of sides; head : (N, H, W) bool, pixels of heads
     """
     result = rgb.clone()
     for row in range(len(rgb)):
@@ -136,7 +136,7 @@ def enhance(net: HeadHsv, rgb: Tensor, uv: Tensor, head: Tensor) -> Tensor:
         crop = functional.grid_sample(pair, grid, mode="bilinear", padding_mode="zeros", align_corners=False)
         with torch.no_grad():
             made = rgb_of(net(head_inputs(crop[:, :3], crop[:, 3:5], crop[:, 5] > 0.5)))
-        # Back into the picture: where its pixels lie in the crop.
+        # Back into the picture: positions of its pixels in the crop.
         theta = _theta(head[row])
         assert theta is not None
         scale, centre = theta

@@ -1,4 +1,4 @@
-"""A U-Net for pictures: convolutions of stride 1 and 2 down, sub-pixel convolutions up, additive skips (paper fig. 5).
+"""U-Net for pictures: convolutions of stride 1 and 2 down, sub-pixel convolutions up, additive skips (paper fig. 5).
 
 The first convolution already halves the picture and the last one doubles it, which costs a quarter of what the full
 picture would, and loses nothing where contours are among the inputs.
@@ -15,7 +15,7 @@ FILTERS: Final = 32
 LEVELS: Final = 4
 
 MULTIPLE: Final = 2**LEVELS
-"""Edges of pictures must be multiples of this."""
+"""Divisor of the edges of input pictures."""
 
 
 class Hourglass(nn.Module):
@@ -27,7 +27,7 @@ class Hourglass(nn.Module):
         self.levels = nn.ModuleList(_Level(filters << (k + 1), filters << k) for k in range(LEVELS - 1))
         self.last = _Conv(filters, filters)
         self.give = nn.Sequential(nn.Conv2d(filters, 4 * outputs, 1), nn.PixelShuffle(2))
-        # A third faster on processors.
+        # A third faster on CPUs.
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: Tensor) -> Tensor:
@@ -39,14 +39,14 @@ class Hourglass(nn.Module):
         for level in reversed(levels):
             hidden = level.up(hidden) + skips.pop()
         hidden = self.last(hidden)
-        # Half precision is enough for what is looked at, not for what is told.
+        # Half precision is enough for features, not for the output.
         with torch.autocast(inputs.device.type, enabled=False):
             result: Tensor = self.give(hidden.float())
         return result
 
     @torch.no_grad()
     def start_at_zero(self) -> None:
-        """Make the output 0 for any input: for networks that change something by what they give."""
+        """Initialise the output to 0 for any input, for networks that predict changes."""
         final = self.give[0]
         assert isinstance(final, nn.Conv2d)
         assert final.bias is not None
@@ -55,7 +55,7 @@ class Hourglass(nn.Module):
 
 
 class _Level(nn.Module):
-    """Down: halve, look around. Up: look around, double."""
+    """One level. Down: halve, convolve. Up: convolve, double."""
 
     def __init__(self, coarse: int, fine: int) -> None:
         super().__init__()

@@ -1,8 +1,8 @@
-"""How large a part is, from its joints and the outline of its mask (paper §4.3: a perceptron of 20, 40, 20 neurons).
+"""Size of a part from its joints and the outline of its mask (paper §4.3: a perceptron of 20, 40, 20 neurons).
 
-A mask has no depth, and a hidden part no mask; the joints between which a part lies tell the rest. Everything goes in
-and comes out in units of the part's own bone, so that a figure twice as large has parts twice as large. Axes are those
-of the view; right parts go in mirrored, as left ones.
+A mask has no depth, and a hidden part no mask; the joints between which a part lies give the rest. Inputs and outputs
+are in units of the part's own bone, so that a figure twice as large has parts twice as large. Axes are those
+of the view; right parts are mirrored to left ones.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from fig2mesh.skeleton import ANCHORS, KINDS, MIRRORED, PART_KIND, anchor_joints
 
 NEURONS: Final = (20, 40, 20)
 OUTPUTS: Final = 4
-LEAST_UNIT: Final = 1e-4
-FARTHEST: Final = 4.0
-"""Logarithms of mask to bone beyond this are cut: a bone that points at the viewer may have next to no length."""
+MIN_UNIT: Final = 1e-4
+MAX_LOG: Final = 4.0
+"""Limit at which logarithms of mask to bone are clamped: a bone that points at the viewer may have almost no length."""
 
 
 @dataclass(frozen=True)
 class SizeShape:
-    """kind : which of `KINDS` a network is for."""
+    """kind : kind of part, one of `KINDS`."""
 
     kind: str
 
@@ -37,7 +37,7 @@ class SizeShape:
 
 
 class PartSizeNet(nn.Module):
-    """The perceptron of one kind."""
+    """Perceptron for one kind of part."""
 
     def __init__(self, shape: SizeShape) -> None:
         super().__init__()
@@ -53,12 +53,12 @@ class PartSizeNet(nn.Module):
         """(N, 4) logarithms of width, height, depth and cube edge, in the unit of the input.
 
         anchors : (N, A, 3) relative to the part's centre, view axes, left side; mask : (N, 2) width and height of the
-        part's mask, zeros where it is not seen
+        part's mask, zeros where it is not visible
         """
         unit = bone_unit(anchors)
-        seen = (mask > 0).all(dim=1, keepdim=True)
-        outline = torch.where(seen, (mask.clamp_min(LEAST_UNIT) / unit[:, None]).log().clamp(-FARTHEST, FARTHEST), 0.0)
-        inputs = torch.cat([(anchors / unit[:, None, None]).flatten(1), outline, seen.to(anchors.dtype)], dim=1)
+        visible = (mask > 0).all(dim=1, keepdim=True)
+        outline = torch.where(visible, (mask.clamp_min(MIN_UNIT) / unit[:, None]).log().clamp(-MAX_LOG, MAX_LOG), 0.0)
+        inputs = torch.cat([(anchors / unit[:, None, None]).flatten(1), outline, visible.to(anchors.dtype)], dim=1)
         sizes: Tensor = self.layers(inputs) + unit.log()[:, None]
         return sizes
 
@@ -66,7 +66,7 @@ class PartSizeNet(nn.Module):
 def bone_unit(anchors: Tensor) -> Tensor:
     """(N,) root mean square distance of anchors (N, A, 3) from their mean."""
     spread = anchors - anchors.mean(dim=1, keepdim=True)
-    return spread.square().sum(dim=2).mean(dim=1).sqrt().clamp_min(LEAST_UNIT)
+    return spread.square().sum(dim=2).mean(dim=1).sqrt().clamp_min(MIN_UNIT)
 
 
 @torch.no_grad()
@@ -75,10 +75,10 @@ def part_size(
 ) -> tuple[NDArray[np.float32], float]:
     """(3,) width, height and depth of a part, and the edge of its PART cube, FIGURE units.
 
-    joints : (21, 3), FIGURE or axes of another view; mask : width and height of the part as drawn, None if it is not
+    joints : (21, 3), FIGURE or axes of another view; mask : width and height of the part as drawn, None if it is hidden
     """
     if PART_KIND[part] != net.shape.kind:
-        raise ValueError(f"part {part} is no {net.shape.kind}")
+        raise ValueError(f"part {part} is not a {net.shape.kind}")
     anchors = np.asarray(joints, np.float64)[list(anchor_joints(part))] - part_centre(part, joints)
     if MIRRORED[part]:
         anchors = anchors * [-1.0, 1.0, 1.0]

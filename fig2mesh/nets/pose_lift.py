@@ -1,9 +1,9 @@
-"""From drawn joints to joints in space: the network of Martinez et al. 2017 as paper §4.1 adapts it.
+"""Lifting of drawn joints to 3D: the network of Martinez et al. 2017 as adapted in paper §4.1.
 
 Linear 1024, then two residual blocks of two linear layers with batch normalisation, ReLU and dropout. For an
 orthographic drawing x and y are kept and only depths are predicted; for a perspective one all three coordinates are.
-The pelvis is the origin. How large a drawn figure would stand is not known, so the input is divided by a scale that its
-own bones tell (`bone_scale`), and the output multiplied by it; `metric` networks trust the units, as the paper does.
+The pelvis is the origin. The standing height of a drawn figure is not known, so the input is divided by a scale
+estimated from its own bones, and the output multiplied by it; `metric` networks trust the units, as the paper does.
 """
 
 from __future__ import annotations
@@ -55,13 +55,13 @@ DEPTH_BONES: Final = tuple(
 )
 """`BONES` from the pelvis outwards: a drawn bone is foreshortened by its depth. Weights keep this order."""
 
-LONGEST: Final = 2.0
-"""Drawn lengths beyond this many usual ones say no more."""
+MAX_LENGTH: Final = 2.0
+"""Clamp of drawn lengths, in usual lengths."""
 
 QUANTILE: Final = 0.8
-"""Most bones are foreshortened, and some are drawn too long: this quantile of drawn to usual length is the scale."""
+"""Quantile of drawn to usual lengths that is the scale: most bones are foreshortened, and some are drawn too long."""
 
-LEAST_SCALE: Final = 1e-6
+MIN_SCALE: Final = 1e-6
 
 USUAL_LENGTHS: Final = tuple(
     {"elbow": 0.27, "wrist": 0.25, "knee": 0.41, "ankle": 0.41, "thorax": 0.42, "shoulder": 0.47}[
@@ -74,12 +74,12 @@ USUAL_LENGTHS: Final = tuple(
 
 @dataclass(frozen=True)
 class PoseLiftShape:
-    """What a network takes and gives.
+    """Inputs and outputs of a network.
 
     joints : 21, or the 16 of Martinez et al.
-    perspective : the drawing is one, so x and y are predicted too
-    visibility : whether a joint is seen is an input
-    limbs : how foreshortened each limb is drawn is an input too: its length l in usual lengths, and √(1 − l²), which is
+    perspective : the drawing is in perspective, so x and y are predicted too
+    visibility : the visibility of joints is an input
+    limbs : the foreshortening of each limb is an input too: its length l in usual lengths, and √(1 − l²), which is
         the depth between its ends but for the sign
     metric : drawn joints are in FIGURE units of a figure that stands 1.79 tall, instead of any unit
     width : of the layers
@@ -98,24 +98,24 @@ class PoseLiftShape:
 
     @property
     def indices(self) -> tuple[int, ...]:
-        """Which of `JOINT_NAMES` the network knows, in its order."""
+        """Indices into `JOINT_NAMES` of the network's joints, in its order."""
         dropped = ADDED if self.joints == 16 else ()
         return tuple(JOINT[name] for name in JOINT_NAMES if name not in dropped)
 
     @property
     def bones(self) -> tuple[tuple[int, int], ...]:
-        """The pairs of `DEPTH_BONES` that the network knows."""
+        """Pairs of `DEPTH_BONES` between joints of the network."""
         known = self.indices
         return tuple(pair for pair in DEPTH_BONES if pair[0] in known and pair[1] in known)
 
     @property
     def inputs(self) -> int:
-        """Numbers that go in."""
+        """Number of inputs."""
         return self.joints * (3 if self.visibility else 2) + (2 * len(self.bones) if self.limbs else 0)
 
 
 SHIPPED: Final = PoseLiftShape(visibility=True, limbs=True)
-"""The network for drawn figures."""
+"""Shape of the network for drawn figures."""
 
 
 class _Block(nn.Module):
@@ -135,7 +135,7 @@ def _layer(inputs: int, outputs: int, dropout: float) -> tuple[nn.Module, ...]:
 
 
 class PoseLift(nn.Module):
-    """The network of a shape; `bone_length` (len(SCALE_BONES),) and `limb_length` hold usual lengths, FIGURE units."""
+    """Network of a shape; `bone_length` (len(SCALE_BONES),) and `limb_length` hold usual lengths, FIGURE units."""
 
     def __init__(self, shape: PoseLiftShape, dropout: float = DROPOUT) -> None:
         super().__init__()
@@ -171,11 +171,11 @@ class PoseLift(nn.Module):
         return result if shape.perspective else torch.cat([flat, result], dim=2)
 
     def foreshortened(self, drawn: Tensor) -> Tensor:
-        """(N, 2 len(bones)) drawn length of each limb of joints (N, J, 2) in usual lengths, and what depth is left."""
+        """(N, 2 len(bones)) drawn length of each limb of joints (N, J, 2) in usual lengths, and the remaining depth."""
         indices = self.shape.indices
         first = [indices.index(a) for a, _ in self.shape.bones]
         second = [indices.index(b) for _, b in self.shape.bones]
-        length = ((drawn[:, first] - drawn[:, second]).norm(dim=2) / self.limb_length).clamp_max(LONGEST)
+        length = ((drawn[:, first] - drawn[:, second]).norm(dim=2) / self.limb_length).clamp_max(MAX_LENGTH)
         return torch.cat([length, (1 - length.square()).clamp_min(0).sqrt()], dim=1)
 
     def scale(self, drawn: Tensor) -> Tensor:
@@ -184,7 +184,7 @@ class PoseLift(nn.Module):
         first = [indices.index(a) for a, _ in SCALE_BONES]
         second = [indices.index(b) for _, b in SCALE_BONES]
         ratios = (drawn[:, first] - drawn[:, second]).norm(dim=2) / self.bone_length
-        return torch.quantile(ratios.float(), QUANTILE, dim=1).clamp_min(LEAST_SCALE)
+        return torch.quantile(ratios.float(), QUANTILE, dim=1).clamp_min(MIN_SCALE)
 
 
 def bone_lengths(joints: Tensor, bones: Sequence[tuple[int, int]] = SCALE_BONES) -> Tensor:
@@ -194,14 +194,14 @@ def bone_lengths(joints: Tensor, bones: Sequence[tuple[int, int]] = SCALE_BONES)
 
 @torch.no_grad()
 def lift(net: PoseLift, drawn: Tensor, visible: Tensor | None = None) -> Tensor:
-    """(N, J, 3) as the network gives it, averaged with the mirror image of what it gives for the mirror image."""
+    """(N, J, 3) prediction averaged with that of the mirror image, mirrored back."""
     indices = net.shape.indices
     twin = [indices.index(JOINT_MIRROR[index]) for index in indices]
     flip = drawn.new_tensor([-1.0, 1.0, 1.0])
     net.eval()
     plain = net(drawn, visible)
-    seen = None if visible is None else visible[:, twin]
-    mirrored = net(drawn[:, twin] * flip[:2], seen)[:, twin] * flip
+    twin_visible = None if visible is None else visible[:, twin]
+    mirrored = net(drawn[:, twin] * flip[:2], twin_visible)[:, twin] * flip
     both: Tensor = (plain + mirrored) / 2
     return both
 
@@ -216,8 +216,8 @@ def lift_joints(
     if net.shape.joints != len(JOINT_NAMES) or net.shape.perspective:
         raise ValueError("drawn figures need the orthographic network of 21 joints")
     drawn = torch.from_numpy(np.array(joints_2d, np.float32)[None])
-    seen = None if visible is None else torch.from_numpy(np.array(visible, np.bool_)[None])
-    depth = lift(net, drawn, seen)[0, :, 2].numpy()
+    flags = None if visible is None else torch.from_numpy(np.array(visible, np.bool_)[None])
+    depth = lift(net, drawn, flags)[0, :, 2].numpy()
     return np.column_stack([np.asarray(joints_2d, np.float32), depth]).astype(np.float32)
 
 

@@ -1,4 +1,4 @@
-"""From what a camera sees of a body to texture coordinates: the network of paper §4.3, figure 5."""
+"""Network from a view of a body to texture coordinates (paper §4.3, figure 5)."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from fig2mesh.skeleton import BODY_PARTS
 PARTS: Final = len(BODY_PARTS)
 
 SPAN: Final = 2.0
-"""Depths within half of this of the middle one are told apart, FIGURE units."""
+"""Range of depths about the middle one that is encoded without clamping, FIGURE units."""
 
 
 @dataclass(frozen=True)
 class UvUnetShape:
-    """masks : depth times the masks of the 14 parts goes in, instead of depth alone; filters : of the first level."""
+    """masks : the input is depth times the masks of the 14 parts, not depth alone; filters : of the first level."""
 
     masks: bool = True
     filters: int = FILTERS
@@ -42,16 +42,16 @@ class UvUnet(Hourglass):
 
 
 def uv_inputs(depth: Tensor, labels: Tensor, masks: bool = True) -> Tensor:
-    """(N, 14 or 1, H, W) what the network takes.
+    """(N, 14 or 1, H, W) input of the network.
 
-    depth : (N, H, W) VIEW z, FIGURE units, anything where nothing is seen
+    depth : (N, H, W) VIEW z, FIGURE units, any value where nothing is visible
     labels : (N, H, W) part labels; extras have no channel of their own and count in the depth alone
     """
-    seen = labels > 0
-    values = torch.where(seen, depth, torch.nan)
+    visible = labels > 0
+    values = torch.where(visible, depth, torch.nan)
     middle = values.flatten(1).nanmedian(dim=1).values.nan_to_num()[:, None, None]
-    # Nothing is 0, so what is seen never is.
-    near = torch.where(seen, (0.55 + (depth - middle) / SPAN).clamp(0.1, 1.0), 0.0)
+    # 0 means nothing, so visible pixels are never 0.
+    near = torch.where(visible, (0.55 + (depth - middle) / SPAN).clamp(0.1, 1.0), 0.0)
     if not masks:
         return near[:, None]
     parts = torch.arange(1, PARTS + 1, device=labels.device)[None, :, None, None]
@@ -59,7 +59,7 @@ def uv_inputs(depth: Tensor, labels: Tensor, masks: bool = True) -> Tensor:
 
 
 def infer_uv(net: UvUnet, depth: Tensor, labels: Tensor) -> Tensor:
-    """(N, 2, H, W) texture coordinates in [0, 1] of what is seen; see `uv_inputs`."""
+    """(N, 2, H, W) texture coordinates in [0, 1] of visible pixels; see `uv_inputs`."""
     with torch.no_grad():
         found: Tensor = net(uv_inputs(depth, labels, net.shape.masks))[:, :2]
     return found.clamp(0.0, 1.0)

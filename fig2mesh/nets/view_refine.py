@@ -1,6 +1,6 @@
 """The second network of Grigorev et al. 2019 (paper §4.4): details of a side painted with colours from elsewhere.
 
-It sees the painted side, where its points are on the body and how near they are, and changes colours. Before training
+Its inputs are the painted side, texture coordinates and depths, its output are changes of colours. Before training
 it changes nothing.
 """
 
@@ -17,7 +17,7 @@ from fig2mesh.nets.uv_unet import uv_inputs
 from fig2mesh.nets.weights import WeightsFile
 
 CHANNELS: Final = 7
-"""Painted colours (3), texture coordinates (2), depth (1), whether there is anything (1)."""
+"""Painted colours (3), texture coordinates (2), depth (1), mask of the body (1)."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class ViewRefine(Hourglass):
 
 
 def refine_inputs(painted: Tensor, uv: Tensor, depth: Tensor, labels: Tensor) -> Tensor:
-    """(N, 7, H, W) what the network takes.
+    """(N, 7, H, W) input of the network.
 
     painted : (N, 3, H, W) 0-1; uv : (N, 2, H, W); depth, labels : (N, H, W), as `uv_inputs` takes them
     """
@@ -47,7 +47,7 @@ def refine_inputs(painted: Tensor, uv: Tensor, depth: Tensor, labels: Tensor) ->
 
 
 def refine(net: ViewRefine, painted: Tensor, uv: Tensor, depth: Tensor, labels: Tensor) -> Tensor:
-    """(N, 3, H, W) 0-1: the sides with the network's changes."""
+    """(N, 3, H, W) 0-1: sides with the network's changes applied."""
     with torch.no_grad():
         changed: Tensor = painted + net(refine_inputs(painted, uv, depth, labels))
     return changed.clamp(0, 1)

@@ -1,7 +1,7 @@
 """Trained parameters: half precision in safetensors files, shipped as package data.
 
-The header says what they are: network, data, seed, scores. It is one JSON text under one key, because the format
-leaves the order of several keys open and the same weights shall give the same bytes.
+The header describes them: network, data, seed, scores. It is one JSON text under one key, because the format leaves
+the order of several keys open and the same weights must give the same bytes.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ M = TypeVar("M", bound=nn.Module)
 
 FOLDER: Final = Path(__file__).resolve().parent.parent / "weights"
 KEY: Final = "fig2mesh"
-REINSTALL: Final = "install fig2mesh again; docs/training.md says how weights are made"
+REINSTALL: Final = "install fig2mesh again; see docs/training.md to train weights"
 
 
 def save(path: Path, state: Mapping[str, Tensor], facts: Mapping[str, Any]) -> None:
-    """Write parameters as float16 (integers as they are) with what is known of them; facts : anything JSON holds."""
+    """Write parameters as float16 (integers as they are) with their metadata; facts : any JSON object."""
     from safetensors.torch import save_file
 
     halves = {
@@ -40,7 +40,7 @@ def save(path: Path, state: Mapping[str, Tensor], facts: Mapping[str, Any]) -> N
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as partial:
         save_file(halves, partial, {KEY: json.dumps(dict(facts), sort_keys=True)})
-        # safetensors writes for the owner alone; package data is for everybody.
+        # safetensors makes files readable by the owner only; package data is for everybody.
         partial.chmod(0o644)
 
 
@@ -49,7 +49,7 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     from safetensors import SafetensorError, safe_open
 
     if not path.is_file():
-        raise InputError(path, "no such file of weights", REINSTALL)
+        raise InputError(path, "no such file", REINSTALL)
     try:
         with safe_open(path, framework="pt") as stream:
             facts = parse_json((stream.metadata() or {})[KEY])
@@ -57,7 +57,7 @@ def read(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
                 raise ValueError("facts")
             state = {name: stream.get_tensor(name) for name in stream.keys()}  # noqa: SIM118 - no mapping
     except (SafetensorError, DamagedFile, OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise InputError(path, f"no readable weights ({type(error).__name__})", REINSTALL) from None
+        raise InputError(path, f"not a readable weights file ({type(error).__name__})", REINSTALL) from None
     broken = [name for name, value in state.items() if not torch.isfinite(value).all()]
     if broken:
         raise InputError(path, f"{broken[0]} holds numbers that are not finite", REINSTALL)
@@ -70,9 +70,9 @@ class WeightsFile(Generic[S, M]):
 
     network : name of the kind among the facts; title : its name in messages, "pose network"
     build : an untrained network of a shape; it keeps the shape as its attribute `shape`
-    read_shape : shape from what the facts say of it
+    read_shape : shape from its entry in the facts
     file_name : name of the file of a shape, without its suffix
-    write_shape : what the facts say of a shape
+    write_shape : entry of a shape in the facts
     """
 
     network: str
@@ -103,14 +103,14 @@ class WeightsFile(Generic[S, M]):
         return net.eval().requires_grad_(False), facts
 
     def shipped(self, shape: S) -> M:
-        """The shipped network of a shape, read once a process."""
+        """The shipped network of a shape, read once per process."""
         net: M = read_shipped(self, shape)
         return net
 
 
 @functools.cache
 def read_shipped(stored: WeightsFile[Any, Any], shape: Any) -> Any:
-    """Read a shipped network for `WeightsFile.shipped`; failures are not remembered."""
+    """Read a shipped network for `WeightsFile.shipped`; failures are not cached."""
     path = stored.path(shape)
     net, _ = stored.read(path)
     if net.shape != shape:

@@ -1,4 +1,4 @@
-"""What is known of a drawing besides its pixels, and its files: keypoints.json, mask.png, part_labels.png."""
+"""Annotation of a drawing, and its files: keypoints.json, mask.png, part_labels.png."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from fig2mesh.records import BoolArray, ByteArray, DepthOrder, Figure, FloatArra
 from fig2mesh.skeleton import JOINT_NAMES, LABEL_COLOURS, PART_NAMES
 
 KEYPOINTS, MASK, PART_LABELS = "keypoints.json", "mask.png", "part_labels.png"
-"""Names of the files in a folder of annotations; the main job's options of the same names read them."""
+"""Names of the files in a folder of annotations; they are read by the main job's options of the same names."""
 
 
 @dataclass(frozen=True)
 class Annotation:
-    """What is known of a drawing; all in IMAGE pixels of the whole picture.
+    """Annotation of a drawing; all in IMAGE pixels of the whole picture.
 
     mask : (H, W) bool; joints_px : (21, 2) float32; visible : (21,) bool; part_labels : (H, W) uint8, 0 outside of
     the mask; depth_order : as in `Figure`; confidence : (21,) 0-1 where the joints were inferred, else None
@@ -35,7 +35,7 @@ class Annotation:
     confidence: FloatArray | None = None
 
     def figure(self, name: str, rgba: ByteArray) -> Figure:
-        """The figure that picture and annotation make."""
+        """Figure made of a picture and this annotation."""
         return Figure(name, rgba, self.mask, self.joints_px, self.visible, self.part_labels, self.depth_order)
 
 
@@ -44,11 +44,11 @@ def write_annotation(
 ) -> tuple[Path, ...]:
     """Write the three files of an annotation, all or none.
 
-    folder : made if it is not there; picture : file name of the drawing; kind : of the joints file, see `WRITERS`
+    folder : created if it does not exist; picture : file name of the drawing; kind : of the joints file, see `WRITERS`
     returns : the files written
 
-    part_labels.png has a palette, so that it can be looked at, and says in the text chunk "legend" what its numbers
-    mean. Raises ExportError where the disk refuses or a file is there already.
+    part_labels.png has a palette for viewing; its text chunk "legend" explains its numbers.
+    Raises ExportError where the disk refuses or a file already exists.
     """
     height, width = annotation.mask.shape
 
@@ -66,7 +66,7 @@ def save_annotation(
     size: tuple[int, int],
     corner: tuple[int, int] = (0, 0),
 ) -> None:
-    """Save the three files in a folder that is there.
+    """Save the three files in an existing folder.
 
     annotation : of a window of the picture; mask and labels are saved as large as that, joints in IMAGE of the picture
     size : (width, height) of the picture; corner : (x, y) of the window; others as for `write_annotation`
@@ -88,7 +88,7 @@ def save_annotation(
 
 
 def on_whole_picture(annotation: Annotation, corner: tuple[int, int], size: tuple[int, int]) -> Annotation:
-    """An annotation of a window in pixels of the whole picture.
+    """Annotation of a window, in pixels of the whole picture.
 
     corner : (x, y) of the window; size : (width, height) of the picture
     """

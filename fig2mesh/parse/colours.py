@@ -1,4 +1,4 @@
-"""Silhouettes by colour: a guess corrected by the colours of figure and ground, and guided filters."""
+"""Segmentation by colour: a guess corrected by the colours of foreground and background, and guided filters."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from scipy import ndimage
 from fig2mesh.records import BoolArray, FloatArray
 
 BINS: Final = 12
-"""Cells an axis of the colour histograms."""
+"""Cells per axis of the colour histograms."""
 
 
 def by_colour(rgb: FloatArray, likely: FloatArray) -> BoolArray:
-    """The guess, corrected near its outline by the colours of figure and ground and the picture's edges."""
+    """Correct the guess near its outline by the colours of foreground and background and the picture's edges."""
     inside, outside = np.clip((likely - 0.6) / 0.4, 0, 1), np.clip((0.4 - likely) / 0.4, 0, 1)
     cells = (np.clip(rgb, 0, 255) * (BINS / 256)).astype(int)
     flat = (cells[..., 0] * BINS + cells[..., 1]) * BINS + cells[..., 2]
@@ -34,7 +34,7 @@ def by_colour(rgb: FloatArray, likely: FloatArray) -> BoolArray:
 
 
 def tidy(mask: BoolArray, likely: FloatArray) -> BoolArray:
-    """The mask without small or unlikely pieces, and with small or likely holes filled."""
+    """Remove small or unlikely pieces of a mask, and fill small or likely holes."""
     regions, count = ndimage.label(mask)
     if not count:
         return likely > 0.5
@@ -84,14 +84,14 @@ def guided(guide: FloatArray, values: FloatArray, radius: int, softness: float) 
 
 
 def grown(mask: BoolArray, radius: int) -> BoolArray:
-    """The mask grown by a number of pixels."""
+    """Dilate a mask by a number of pixels."""
     if radius == 0:
         return mask
     return np.asarray(ndimage.distance_transform_edt(~mask) <= radius) if mask.any() else mask
 
 
 def reduced(picture: FloatArray, step: int) -> FloatArray:
-    """Means of step × step pixels."""
+    """Downsample: means of step × step pixels."""
     if step == 1:
         return picture
     height, width = (length // step * step for length in picture.shape[:2])

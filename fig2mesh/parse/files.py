@@ -1,4 +1,4 @@
-"""Files of what was found in a picture: one figure's three files, or a folder for each figure of a sheet."""
+"""Files of a parsed picture: one figure's three files, or a folder for each figure of a sheet."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def write_sheet(
 def coco_of(
     figures: Sequence[SheetFigure], names: Sequence[str], size: tuple[int, int], picture: str
 ) -> dict[str, Any]:
-    """The figures as a COCO keypoint file, with `score`, the parser's `doubts` and the `folder` of each beside.
+    """The figures as a COCO keypoint file, with the `score`, the parser's `doubts` and the `folder` of each.
 
     https://cocodataset.org/#format-data
     """
@@ -84,7 +84,7 @@ def coco_of(
 
 
 def annotation_of(found: Reading) -> Annotation:
-    """What was read and inferred, in pixels of the whole picture."""
+    """Annotation of what was read and inferred, in pixels of the whole picture."""
     figure = found.figure
     window = Annotation(
         figure.mask, figure.joints_px, figure.visible, found.part_labels, figure.depth_order, found.confidence

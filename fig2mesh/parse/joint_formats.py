@@ -1,4 +1,4 @@
-"""Joints in the files of annotation tools, told apart by content: COCO, LabelMe, Supervisely.
+"""Joints in the files of annotation tools, distinguished by content: COCO, LabelMe, Supervisely.
 
 https://cocodataset.org/#format-data
 https://github.com/wkentaro/labelme
@@ -21,10 +21,10 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class NamedPoints:
-    """One figure's points as a file has them.
+    """Points of one figure, as read from a file.
 
-    points : canonical name → (2,) float64, IMAGE; visible : the same names → whether the point is seen
-    size : (width, height) of the picture, None where the file does not say
+    points : canonical name → (2,) float64, IMAGE; visible : the same names → whether it is visible
+    size : (width, height) of the picture, None where the file does not state it
     """
 
     points: dict[str, Point]
@@ -33,13 +33,13 @@ class NamedPoints:
 
 
 def named_points(content: Any, path: Path, picture: str, bbox: Box | None) -> NamedPoints | None:
-    """The points of the one figure that a file is about; None for a file of none of these formats.
+    """Points of the one figure in a file; None for a file of none of these formats.
 
     content : the parsed JSON
     picture : file name of the drawing, by which one of several pictures in a COCO file is chosen
     bbox : x0, y0, x1, y1, IMAGE, by which one of several figures is chosen: the one with most points inside
 
-    Raises FigureError for a damaged file, or one that leaves open which figure is meant.
+    Raises FigureError for a damaged file, or one in which the figure is ambiguous.
     """
     if not isinstance(content, dict):
         return None
@@ -86,10 +86,10 @@ def _coco(content: dict[str, Any], path: Path, picture: str) -> list[NamedPoints
             found = f"{len(values)} numbers for {len(labels)} keypoint names"
             raise FigureError(path, found, "give x, y, v for each name in categories[].keypoints")
         image = images.get(image_key, {})
-        # v: 0 not labelled, 1 labelled but hidden, 2 seen.
+        # v: 0 not labelled, 1 labelled but hidden, 2 visible.
         triples = [(label, values[3 * i : 3 * i + 2], values[3 * i + 2]) for i, label in enumerate(labels)]
-        seen = [(label, point, flag == 2) for label, point, flag in triples if flag]
-        figures.append(_figure(seen, _size(image.get("width"), image.get("height")), path))
+        shown = [(label, point, flag == 2) for label, point, flag in triples if flag]
+        figures.append(_figure(shown, _size(image.get("width"), image.get("height")), path))
     return figures
 
 
@@ -139,14 +139,14 @@ def _objects(values: Any) -> list[dict[str, Any]]:
 
 
 def _key(identifier: Any) -> str:
-    """Identifiers are numbers or texts; what else a damaged file has instead must not break a look-up."""
+    """Identifier as text: usually a number or a string, but whatever a damaged file has must not break the lookup."""
     return repr(identifier)
 
 
 def _figure(named: list[tuple[str, Any, bool]], size: tuple[int, int] | None, path: Path) -> NamedPoints:
     points: dict[str, Point] = {}
     visible: dict[str, bool] = {}
-    for name, value, seen in named:
+    for name, value, shown in named:
         if name not in KNOWN:
             continue  # annotation files hold other things too
         if name in points:
@@ -157,7 +157,7 @@ def _figure(named: list[tuple[str, Any, bool]], size: tuple[int, int] | None, pa
             point = np.full(2, np.nan)
         if point.shape != (2,) or not (np.abs(point) < 1e9).all():
             raise FigureError(path, f"{name} is {str(value)[:60]}", "give x and y as finite numbers")
-        points[name], visible[name] = point, seen
+        points[name], visible[name] = point, shown
     return NamedPoints(points, visible, size)
 
 

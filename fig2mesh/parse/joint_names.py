@@ -1,4 +1,4 @@
-"""What annotation tools and data sets call the 21 joints, and joints that follow from those they have."""
+"""Names of the 21 joints in annotation tools and data sets, and joints derived from others."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ SYNONYMS: dict[str, str] = {
     "toe": "foot", "toes": "foot", "big_toe": "foot", "foot_index": "foot",
 }
 # fmt: on
-"""Words of others for our joints, without their side. A hip with a side is the hip, one without the pelvis."""
+"""Synonyms of joint names, without their side. A hip with a side is the hip, one without the pelvis."""
 
 KNOWN = frozenset(JOINT_NAMES) | {"nose", "l_eye", "r_eye", "l_ear", "r_ear"}
-"""Names that can be used: the joints, and what head and eyes follow from."""
+"""Known names: the joints, and the points from which head and eyes are derived."""
 
 HAND_LENGTH = 0.35
-"""From wrist to the middle of the hand, of the lower arm's length (the mean of the poses we train on)."""
+"""Distance from the wrist to the middle of the hand, share of the lower arm's length (mean of the training poses)."""
 
 FOOT_LENGTH = 0.3
-"""From ankle to toes, of the lower leg's length, where nothing says which way the foot points: along the leg."""
+"""Distance from ankle to toes, share of the lower leg's length; along the leg where the foot's direction is unknown."""
 
 
 def canonical(name: str) -> str:
-    """Our name of a joint that may be spelt otherwise: "Left Shoulder", "leftShoulder", "shoulder_l" → "l_shoulder"."""
+    """Canonical name of a joint: "Left Shoulder", "leftShoulder", "shoulder_l" → "l_shoulder"."""
     words = re.sub(r"([a-z])([A-Z])", r"\1_\2", name.strip())
     parts = [word for word in re.split(r"[^a-z0-9]+", words.lower()) if word]
     side = ""
@@ -53,10 +53,10 @@ def canonical(name: str) -> str:
 
 
 def completed(points: Mapping[str, Point]) -> dict[str, Point]:
-    """The joints that follow from others: COCO has no neck, no hands and no feet, but where they are is no secret.
+    """Derive joints from others: COCO has no neck, no hands and no feet, but their positions follow from the rest.
 
     points : known names (`KNOWN`) → (2,) IMAGE
-    returns : only what was not there and could be told
+    returns : only missing joints that could be derived
     """
     known = dict(points)
     new: dict[str, Point] = {}

@@ -1,4 +1,4 @@
-"""Joints as JSON: ours, and those of annotation tools, to correct them there (`fig2mesh.parse.joint_formats` reads)."""
+"""Joints as JSON: our own format, and those of annotation tools, for correction there; read by `joint_formats`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LONG_NAMES = tuple(
     {"l_": "left_", "r_": "right_"}.get(name[:2], name[:2]) + name[2:] for name in JOINT_NAMES
 )
 # fmt: on
-"""left_shoulder instead of l_shoulder, as data sets have it."""
+"""left_shoulder instead of l_shoulder, as in data sets."""
 
 
 def as_ours(joints: FloatArray, visible: BoolArray, size: tuple[int, int], picture: str) -> Document:
@@ -110,5 +110,5 @@ WRITERS: dict[str, Writer] = {
 
 
 def _rounded(joints: FloatArray) -> list[tuple[float, float]]:
-    # Hundredths of a pixel are below what anybody can point at, and keep the files readable.
+    # Hundredths of a pixel are finer than anybody can point at, and keep the files readable.
     return [(round(x, 2), round(y, 2)) for x, y in joints.astype(float).tolist()]

@@ -1,4 +1,4 @@
-"""The 21 joints from a file: `{"width", "height", "keypoints": {name: [x, y, visible]}}`, or an annotation tool's."""
+"""Reading 21 joints: `{"width", "height", "keypoints": {name: [x, y, visible]}}`, or an annotation tool's file."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from fig2mesh.skeleton import JOINT_NAMES, LIMBS
 from georef.untrusted.json_file import read_json
 
 MAX_BYTES = 4 << 20
-"""Larger files are no joint files; reading them whole would only cost memory."""
+"""Size limit of joint files; reading larger ones would only cost memory."""
 
 
 @dataclass(frozen=True)
 class Joints:
-    """What a joints file says.
+    """Content of a joints file.
 
     points_px : (21, 2) float32, IMAGE, in the order of `JOINT_NAMES`
     visible : (21,) bool
-    size : (width, height) of the picture they were drawn on, None where the file does not say
+    size : (width, height) of the picture they were drawn on, None where the file does not state it
     depth_order : as in `fig2mesh.records.Figure`
     """
 
@@ -39,7 +39,7 @@ class Joints:
 
 
 def read_keypoints(path: Path, picture: str = "", bbox: Box | None = None) -> Joints:
-    """Read joints: our own JSON, COCO, LabelMe or Supervisely, told apart by content.
+    """Read joints: our own JSON, COCO, LabelMe or Supervisely, distinguished by content.
 
     Parameters
     ----------
@@ -99,6 +99,6 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and abs(value) < 1e9 and math.isfinite(value)
 
 
-def _listed(names: list[str], most: int = 6) -> str:
-    shown = ", ".join(name[:30] for name in names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+def _listed(names: list[str], limit: int = 6) -> str:
+    shown = ", ".join(name[:30] for name in names[:limit])
+    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"

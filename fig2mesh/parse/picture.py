@@ -14,17 +14,17 @@ from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, si
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import PART_NAMES
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.image_file import NoPicture, TooLarge, check_scans, open_head, pillow
+from georef.untrusted.image_file import NotAPicture, TooLarge, check_scans, open_header, pillow
 
 OPAQUE = np.array([0, 0, 0, 255], np.uint8)
 
 BAND_PX = 512
-"""Rows that are converted to RGBA at a time."""
+"""Rows converted to RGBA at a time."""
 
 
 @dataclass(frozen=True)
-class View:
-    """The part of a picture that holds the figure.
+class PictureView:
+    """Part of a picture that holds the figure.
 
     rgba : (H, W, 4) uint8; corner : (x, y) of its corner in the picture; size : (width, height) of the whole picture
     """
@@ -35,37 +35,37 @@ class View:
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """Its rows and columns in the whole picture."""
+        """Rows and columns in the whole picture."""
         (x, y), (height, width) = self.corner, self.rgba.shape[:2]
         return slice(y, y + height), slice(x, x + width)
 
 
-def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> View:
-    """The picture, or the part of it inside of `bbox`; of large ones no more than that is kept in memory.
+def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> PictureView:
+    """Read a picture, or the part of it inside `bbox`; of large pictures only that part is kept in memory.
 
     Raises FigureError as `read_figure` does.
     """
     if bbox is None:
         rgba = read_rgba(path)
-        return View(rgba, (0, 0), (rgba.shape[1], rgba.shape[0]))
+        return PictureView(rgba, (0, 0), (rgba.shape[1], rgba.shape[0]))
     if is_large(path):
         pixels, size = read_window(path, bbox)
-        return View(pixels, bbox[:2], size)
+        return PictureView(pixels, bbox[:2], size)
     rgba = read_rgba(path)
     height, width = rgba.shape[:2]
     x0, y0, x1, y1 = bbox
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
-    return View(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
+    return PictureView(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
 
 
 def _open(path: Path, what: str) -> Image.Image:
-    """Open and decode a picture, or say in one line why not."""
+    """Open and decode a picture. Raises FigureError with the reason in one line."""
     intact = f"give an intact picture as {what}"
     try:
-        if path.exists() and not path.is_file():  # a pipe would be waited for, a device never end
-            raise FigureError(path, "cannot be read (no plain file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
-        image = open_head(path, FORMATS)
+        if path.exists() and not path.is_file():  # reading a pipe would block, and a device never ends
+            raise FigureError(path, "cannot be read (not a regular file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
+        image = open_header(path, FORMATS)
         if image.width * image.height > MAX_PIXELS:
             raise TooLarge(f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx")
         check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
@@ -75,7 +75,7 @@ def _open(path: Path, what: str) -> Image.Image:
         return image
     except TooLarge as error:
         raise FigureError(path, str(error), "pass --bbox X0 Y0 X1 Y1 round the figure") from None
-    except NoPicture:
+    except NotAPicture:
         raise FigureError(path, "not a picture that can be read", f"give a PNG, JPEG, TIFF or WebP as {what}") from None
     except DamagedFile as error:
         raise FigureError(path, f"cannot be read ({error})", intact) from None
@@ -118,15 +118,15 @@ def _rgba(image: Image.Image) -> ByteArray:
 
 
 def _grey(image: Image.Image, band: tuple[int, int]) -> NDArray[np.uint16 | np.float64]:
-    """Rows of a picture of one deep channel; where a float one holds no number, 0."""
+    """Rows of a picture of one deep channel; NaN becomes 0."""
     rows = np.asarray(image.crop((0, band[0], image.width, band[1])))
     if rows.dtype.itemsize == 2:
         return rows.astype(np.uint16)
     return np.nan_to_num(rows.astype(np.float64), nan=0.0)
 
 
-def read_mask(path: Path | None, view: View) -> BoolArray | None:
-    """(H, W) bool silhouette from a file, or from the figure's alpha where there is none; None where there is neither.
+def read_mask(path: Path | None, view: PictureView) -> BoolArray | None:
+    """(H, W) bool silhouette from a file, else from the figure's alpha; None where there is neither.
 
     Raises FigureError.
     """
@@ -143,12 +143,12 @@ def read_mask(path: Path | None, view: View) -> BoolArray | None:
     if (values[..., 3] < 255).any():
         return values[..., 3] >= 128
     grey = values[..., :3].max(axis=2)
-    # Masks also come as 0/1 pictures.
+    # Some masks are 0/1 pictures.
     return np.asarray(grey >= (128 if grey.max() > 1 else 1))
 
 
-def _of_view(path: Path, view: View) -> ByteArray | None:
-    """The view's part of a picture beside the figure's; None where that picture is not as large as the figure's."""
+def _of_view(path: Path, view: PictureView) -> ByteArray | None:
+    """Part of another picture in the view's window; None where that picture differs in size from the figure's."""
     if is_large(path) and view.rgba.shape[:2] != view.size[::-1]:
         (x, y), (height, width) = view.corner, view.rgba.shape[:2]
         whole = size_of(path) == view.size
@@ -157,7 +157,7 @@ def _of_view(path: Path, view: View) -> ByteArray | None:
     return values[view.window] if values.shape[:2] == view.size[::-1] else None
 
 
-def read_labels(path: Path, view: View) -> ByteArray:
+def read_labels(path: Path, view: PictureView) -> ByteArray:
     """(H, W) uint8 part labels from a file. Raises FigureError."""
     image = _open(path, "part labels")
     if image.mode not in ("L", "P"):
@@ -174,7 +174,7 @@ def read_labels(path: Path, view: View) -> ByteArray:
 
 
 def on_white(rgba: ByteArray) -> ByteArray:
-    """(H, W, 3) the picture as a viewer shows it on white paper."""
+    """(H, W, 3) composite the picture over white."""
     if (rgba[..., 3] == 255).all():
         return np.ascontiguousarray(rgba[..., :3])
     alpha = rgba[..., 3:].astype(np.float32) / 255

@@ -1,4 +1,4 @@
-"""Read one drawn figure: its files, and what none of them gives inferred from the picture."""
+"""Read one drawn figure from its files, and infer from the picture what they do not give."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.keypoints import Joints, read_keypoints
-from fig2mesh.parse.picture import View, on_white, read_labels, read_mask, read_view
+from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
 from fig2mesh.records import BoolArray, ByteArray, Figure, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES
 
@@ -21,33 +21,33 @@ if TYPE_CHECKING:
 log = logging.getLogger("fig2mesh")
 
 JOINT_SLACK_PX = 1.0
-"""Joints may lie on the picture's edge; rounding by annotation tools puts them up to a pixel outside."""
+"""Tolerance: joints may lie on the picture's edge, and rounding by annotation tools puts them up to a pixel outside."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A figure as it was read, and what was inferred for it.
+    """Figure as read, and what was inferred for it.
 
     figure : within its window of the picture; view : that window
-    part_labels : (H, W) uint8 of the window, those given, or inferred where that was asked for
+    part_labels : (H, W) uint8 of the window, those given, or inferred where requested
     confidence : (21,) 0-1 where joints were inferred, else None
     """
 
     figure: Figure
-    view: View
+    view: PictureView
     part_labels: ByteArray
     confidence: FloatArray | None
 
 
 @dataclass(frozen=True)
 class Given:
-    """What the files of a figure give.
+    """Content of the files of a figure.
 
     view : the figure's window of the picture; silhouette : (H, W) bool, None where no file has one; joints : in pixels
-    of the view, None without a file; part_labels : (H, W) uint8, 0 where nothing is said
+    of the view, None without a file; part_labels : (H, W) uint8, 0 where no label is given
     """
 
-    view: View
+    view: PictureView
     silhouette: BoolArray | None
     joints: Joints | None
     part_labels: ByteArray
@@ -62,7 +62,7 @@ def read_figure(
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
 ) -> Figure:
-    """Read a figure from its files; silhouette and joints that none of them gives are inferred from the picture.
+    """Read a figure from its files; a missing silhouette and missing joints are inferred from the picture.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def read_parsed(
     name: str | None = None,
     labels: bool = False,
 ) -> Reading:
-    """As `read_figure`, with what it was inferred from; labels : infer part labels where none are given."""
+    """As `read_figure`, and return what was inferred as well; labels : infer part labels where none are given."""
     given = read_given(path, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
     view, silhouette, joints, known = given.view, given.silhouette, given.joints, given.part_labels
     confidence, parts = None, known
@@ -131,7 +131,7 @@ def read_given(
     part_labels: Path | None = None,
     bbox: tuple[int, int, int, int] | None = None,
 ) -> Given:
-    """What the files of a figure give; nothing is inferred. Parameters and errors as of `read_figure`."""
+    """Read the files of a figure; nothing is inferred. Parameters and errors as of `read_figure`."""
     view = read_view(path, bbox)
     silhouette = read_mask(mask, view)
     joints = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
@@ -146,13 +146,13 @@ def read_given(
         if outside.any():
             index = int(np.argmax(outside))
             x, y = joints.points_px[index]
-            said = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
-            raise FigureError(keypoints, said, "move it inside, or pass the joints that belong to this picture")
+            finding = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
+            raise FigureError(keypoints, finding, "move it inside, or pass the joints that belong to this picture")
     return Given(view, silhouette, joints, known)
 
 
-def joints_of_view(path: Path, view: View, picture: Path, bbox: tuple[int, int, int, int] | None) -> Joints:
-    """The joints of a file, in IMAGE pixels of the view. Raises FigureError, also for those of another picture."""
+def joints_of_view(path: Path, view: PictureView, picture: Path, bbox: tuple[int, int, int, int] | None) -> Joints:
+    """Read the joints of a file, in IMAGE pixels of the view. Raises FigureError, also for those of another picture."""
     given = read_keypoints(path, picture.name, bbox)
     if given.size is not None and given.size != view.size:
         made, has = (f"{width}×{height}" for width, height in (given.size, view.size))
@@ -163,13 +163,13 @@ def joints_of_view(path: Path, view: View, picture: Path, bbox: tuple[int, int, 
 
 
 def _inferred(path: Path, rgba: ByteArray, silhouette: BoolArray | None) -> Inference:
-    """What the figure parser finds in a picture; what it doubts is said."""
-    # torch takes seconds to load: only pictures without mask or joints pay for it.
+    """Infer with the figure parser; its doubts are logged as a warning."""
+    # torch takes seconds to load: it is imported only for pictures without mask or joints.
     from fig2mesh.parse.infer import REMEDY, infer_figure
 
     found = infer_figure(on_white(rgba), silhouette)
     if found is None:
-        raise FigureError(path, "no figure is found in it", "pass --bbox round the figure, or --mask and --keypoints")
+        raise FigureError(path, "no figure found", "pass --bbox round the figure, or --mask and --keypoints")
     if found.doubts:
         log.warning("%s: %s; %s", path, "; ".join(found.doubts), REMEDY)
     return found

@@ -1,4 +1,4 @@
-"""Figures on a whole sheet: where on it the network sees one, looking at windows of many sizes."""
+"""Detection of figures on a whole sheet, by sliding windows of many sizes."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fig2mesh.parse.infer import Inference, box_of, infer_figure, look, square
+from fig2mesh.parse.infer import Inference, box_of, infer_figure, predict, square
 from fig2mesh.parse.joints import decode
 from fig2mesh.parse.picture import on_white, read_view
 from fig2mesh.records import ByteArray
 
-LONGEST: Final = 2400
-"""Sheets are looked at with at most so many pixels along their longer side; figures themselves in full."""
+MAX_SIDE_PX: Final = 2400
+"""Largest number of pixels along the longer side of a sheet that is searched; figures found are read in full."""
 
 STEP: Final = 0.45
-"""Windows of one size lie this share of their edge apart: a figure is whole in one of them."""
+"""Stride of windows, share of their edge: a figure is whole in one of them."""
 
-SMALLER: Final = 0.62
-"""The edges of windows, each to the next larger one: the network was trained on figures of this range of sizes."""
+SCALE_STEP: Final = 0.62
+"""Ratio of window edges, each to the next larger one: the network was trained on figures of this range of sizes."""
 
-GLANCE: Final = 0.42
-"""Mean confidence of the joints from which on a window is looked at again, with the figure in its middle."""
+MIN_FIRST_CONFIDENCE: Final = 0.42
+"""Confidence threshold, mean over the joints, for evaluating a window again with the figure in its middle."""
 
-SEEN: Final = 0.6
-"""Mean confidence of the joints of a figure. Plain map gives up to 0.55, figures that are whole 0.65 and more."""
+MIN_CONFIDENCE: Final = 0.6
+"""Confidence threshold of a figure, mean over its joints. Plain map gives up to 0.55, whole figures 0.65 and more."""
 
-SAME: Final = 0.45
-"""Boxes that share this much of the smaller one are of one figure."""
+MIN_OVERLAP: Final = 0.45
+"""Overlap threshold, share of the smaller box, above which two boxes are of one figure."""
 
 BATCH: Final = 8
 
 
 @dataclass(frozen=True)
 class SheetFigure:
-    """A figure on a sheet.
+    """Figure on a sheet.
 
     bbox : x0, y0, x1, y1, IMAGE of the sheet, with some room; confidence : mean of its joints', 0-1
-    found : what it is, in pixels of `bbox`
+    found : its annotation, in pixels of `bbox`
     """
 
     bbox: tuple[int, int, int, int]
@@ -51,9 +51,9 @@ class SheetFigure:
 
 
 def find_figures(sheet: Path | str, smallest_px: float | None = None) -> list[SheetFigure]:
-    """The people drawn on a sheet, from the top down.
+    """Find the people drawn on a sheet, from the top down.
 
-    sheet : picture of any size that memory holds; smallest_px : height of the smallest figure that is looked for,
+    sheet : picture of any size that memory holds; smallest_px : height of the smallest figure to find,
     pixels; default: a tenth of the longer side
 
     Raises FigureError where the picture cannot be read.
@@ -64,13 +64,13 @@ def find_figures(sheet: Path | str, smallest_px: float | None = None) -> list[Sh
 def figures_in(
     rgb: ByteArray, smallest_px: float | None = None, advance: Callable[[str], object] = lambda name: None
 ) -> list[SheetFigure]:
-    """The figures in a picture, from the top down.
+    """Find the figures in a picture, from the top down.
 
-    rgb : (H, W, 3) uint8; smallest_px : height of the smallest figure that is looked for; None: a tenth of the longer
-    side; advance : told what is under way
+    rgb : (H, W, 3) uint8; smallest_px : height of the smallest figure to find; None: a tenth of the longer side
+    advance : called with a description of each step
     """
     height, width = rgb.shape[:2]
-    scale = min(1.0, LONGEST / max(height, width))
+    scale = min(1.0, MAX_SIDE_PX / max(height, width))
     size = (max(round(width * scale), 1), max(round(height * scale), 1))
     small = np.asarray(Image.fromarray(rgb).resize(size, Image.Resampling.BOX)) if scale < 1 else rgb
     smallest = (0.1 * max(height, width) if smallest_px is None else smallest_px) * scale
@@ -81,22 +81,22 @@ def figures_in(
             candidates += _centred(small, centre, edge)
     kept: list[tuple[float, NDArray[np.float64]]] = []
     for score, box in sorted(candidates, key=lambda each: -each[0]):
-        if all(_shared(box, other) < SAME for _, other in kept):
+        if all(_shared(box, other) < MIN_OVERLAP for _, other in kept):
             kept.append((score, box))
     figures: list[SheetFigure] = []
     for _, box in kept:
         advance("figure")
         figure = _whole(rgb, box / scale)
         # Two boxes may have led to one figure.
-        if figure is not None and not any(_shared(_array(figure), _array(other)) > SAME for other in figures):
+        if figure is not None and not any(_shared(_array(figure), _array(other)) > MIN_OVERLAP for other in figures):
             figures.append(figure)
     return sorted(figures, key=lambda each: (each.bbox[1], each.bbox[0]))
 
 
 def _edges(longest: float, smallest: float) -> list[float]:
     edges = [float(longest)]
-    while edges[-1] * SMALLER >= 1.15 * smallest:
-        edges.append(edges[-1] * SMALLER)
+    while edges[-1] * SCALE_STEP >= 1.15 * smallest:
+        edges.append(edges[-1] * SCALE_STEP)
     return edges
 
 
@@ -111,7 +111,7 @@ def _centres(shape: tuple[int, ...], edge: float) -> NDArray[np.float64]:
 
 
 def _promising(rgb: ByteArray, edge: float) -> Iterator[NDArray[np.float64]]:
-    """Middles of windows that may hold a figure, by one look each without its mirror image."""
+    """Centres of windows that may hold a figure, by one prediction each without its mirror image."""
     import torch
 
     from fig2mesh.nets import figure_parser
@@ -126,19 +126,19 @@ def _promising(rgb: ByteArray, edge: float) -> Iterator[NDArray[np.float64]]:
             heat = net(batch.contiguous(memory_format=torch.channels_last)).heat
         shares = heat.flatten(2).softmax(dim=2).reshape(heat.shape).numpy()
         for centre, share in zip(part, shares, strict=True):
-            if float(decode(share, 0.8)[1].mean()) > GLANCE:
+            if float(decode(share, 0.8)[1].mean()) > MIN_FIRST_CONFIDENCE:
                 yield centre
 
 
 def _centred(rgb: ByteArray, centre: NDArray[np.float64], edge: float) -> list[tuple[float, NDArray[np.float64]]]:
-    """The box of the figure in a window and how surely it is one, after a look with it in the middle; or nothing."""
-    box = box_of(look(rgb, centre, edge), rgb.shape[:2])
+    """Confidence and bounding box of the figure in a window, after a prediction with it in the middle; or nothing."""
+    box = box_of(predict(rgb, centre, edge), rgb.shape[:2])
     if box is None:
         return []
-    second = look(rgb, (box[:2] + box[2:]) / 2, 1.24 * float((box[2:] - box[:2]).max()))
-    box = box_of(second, rgb.shape[:2])
-    score = float(decode(second.heat, 0.8)[1].mean())
-    return [] if box is None or score < SEEN else [(score, box)]
+    prediction = predict(rgb, (box[:2] + box[2:]) / 2, 1.24 * float((box[2:] - box[:2]).max()))
+    box = box_of(prediction, rgb.shape[:2])
+    score = float(decode(prediction.heat, 0.8)[1].mean())
+    return [] if box is None or score < MIN_CONFIDENCE else [(score, box)]
 
 
 def _whole(rgb: ByteArray, box: NDArray[np.float64]) -> SheetFigure | None:
@@ -147,13 +147,13 @@ def _whole(rgb: ByteArray, box: NDArray[np.float64]) -> SheetFigure | None:
     low = np.maximum(np.floor(box[:2] - room), 0).astype(int)
     high = np.minimum(np.ceil(box[2:] + room), [width, height]).astype(int)
     found = infer_figure(rgb[low[1] : high[1], low[0] : high[0]])
-    if found is None or float(found.confidence.mean()) < SEEN:
+    if found is None or float(found.confidence.mean()) < MIN_CONFIDENCE:
         return None
     return _tight(found, (int(low[0]), int(low[1])))
 
 
 def _tight(found: Inference, corner: tuple[int, int]) -> SheetFigure:
-    """The figure in the box of its silhouette and joints, with some pixels of room."""
+    """Crop a figure to the bounding box of its silhouette and joints, with a margin of some pixels."""
     rows, columns = np.flatnonzero(found.mask.any(axis=1)), np.flatnonzero(found.mask.any(axis=0))
     height, width = found.mask.shape
     room = max(2, round(0.02 * (rows[-1] - rows[0] + 1)))
@@ -176,7 +176,7 @@ def _array(figure: SheetFigure) -> NDArray[np.float64]:
 
 
 def _shared(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Common area of two boxes, share of the smaller one."""
+    """Overlap of two boxes, share of the smaller one."""
     low, high = np.maximum(one[:2], other[:2]), np.minimum(one[2:], other[2:])
     common = float(np.prod(np.maximum(high - low, 0)))
     areas = [max(float(np.prod(box[2:] - box[:2])), 1e-9) for box in (one, other)]

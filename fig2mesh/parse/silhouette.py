@@ -1,8 +1,9 @@
-"""A crisp silhouette from a coarse one: what the picture's own lines and colours say of a network's guess.
+"""Refinement of a coarse silhouette: a network's guess corrected by the picture's own lines and colours.
 
-Colours of what is surely figure and surely ground decide near the guessed outline, smoothed along the picture's edges
-by a guided filter (He, Sun, Tang 2013). On plain grounds (paper, one colour, soft gradients) lines know better: all
-that can be reached from the rim without crossing one is ground. Where the two differ, the guess decides piece by piece.
+Colours of certain foreground and certain background decide near the guessed outline, smoothed along the picture's edges
+by a guided filter (He, Sun, Tang 2013). On plain backgrounds (paper, one colour, soft gradients) lines are more exact:
+all that can be reached from the rim without crossing one is background. Where the two differ, the guess decides piece
+by piece.
 """
 
 from __future__ import annotations
@@ -16,36 +17,36 @@ from scipy import ndimage
 from fig2mesh.parse.colours import by_colour, grown, reduced
 from fig2mesh.records import BoolArray, ByteArray, FloatArray
 
-WORKING: Final = 800
-"""Pixels of the longer side at which the outline is sought; larger pictures are reduced for it."""
+WORKING_PX: Final = 800
+"""Working size, pixels along the longer side; larger pictures are reduced to it."""
 
 PLAIN_SHARE: Final = 0.7
-"""A ground is plain where this share of what the network calls ground has the colour of a smooth sheet."""
+"""A background is plain where this share of what the network calls background has the colour of a smooth fit."""
 
-FAINT: Final = 10.0
-"""Colours nearer to the ground's than this are the ground's, 0-255."""
+BACKGROUND_TOLERANCE: Final = 10.0
+"""Colour tolerance of the background, 0-255."""
 
-ROUGH: Final = 7.0
-"""Grain of paper beyond which a ground is not plain, 0-255."""
+MAX_NOISE: Final = 7.0
+"""Largest noise (grain of paper) of a plain background, 0-255."""
 
-AGREED: Final = 0.72
-"""IoU with the guess from which an outline that lines have is believed."""
+MIN_IOU: Final = 0.72
+"""Threshold of IoU with the guess from which the outline by lines is used."""
 
-BESIDE: Final = 0.4
-LOST: Final = 0.8
-"""Pieces that lines enclose and colours do not are left out below the one likelihood; those that colours find and
-lines do not are taken in above the other."""
+EXCLUDE_BELOW: Final = 0.4
+INCLUDE_ABOVE: Final = 0.8
+"""Likelihoods below which pieces enclosed by lines but not found by colour are excluded, and above which pieces found
+by colour but not enclosed are included."""
 
-BLUR: Final = 3
-"""Width of the rim that scans blur, pixels."""
+BLUR_PX: Final = 3
+"""Width of the rim blurred by scanning, pixels."""
 
 GAPS: Final = (0, 1, 2, 4, 7, 11)
 """Half widths of gaps in the drawn outline that are bridged, pixels of the working size."""
 
 
-class Sheet(NamedTuple):
-    """away : (H, W) float32, how far a pixel's colour is from the plain ground's, 0-255; noise : its spread there
-    share : of the ground that has the sheet's colour"""
+class PlainBackground(NamedTuple):
+    """away : (H, W) float32, distance of a pixel's colour from the fitted background, 0-255; noise : its spread there
+    share : of the background that has the fitted colour"""
 
     away: FloatArray
     noise: float
@@ -55,10 +56,10 @@ class Sheet(NamedTuple):
 def refine(rgb: ByteArray, likely: FloatArray) -> BoolArray:
     """(H, W) bool silhouette.
 
-    rgb : (H, W, 3) uint8; likely : (H, W) float32, how likely a network holds each pixel for the figure, 0-1
+    rgb : (H, W, 3) uint8; likely : (H, W) float32, probability of each pixel to be foreground, by a network, 0-1
     """
     height, width = likely.shape
-    step = max(1, int(np.ceil(max(height, width) / WORKING)))
+    step = max(1, int(np.ceil(max(height, width) / WORKING_PX)))
     small, guess = reduced(rgb.astype(np.float32), step), reduced(likely[..., None], step)[..., 0]
     found = _outline(small, guess)
     if step == 1:
@@ -73,25 +74,25 @@ def _outline(rgb: FloatArray, likely: FloatArray) -> BoolArray:
     if not guess.any():
         return guess
     coloured = by_colour(rgb, likely)
-    sheet = plain_sheet(rgb, likely)
-    if sheet is None or sheet.share < PLAIN_SHARE:
+    background = plain_background(rgb, likely)
+    if background is None or background.share < PLAIN_SHARE:
         return coloured
-    enclosed, score = _enclosed(sheet, likely)
-    return _merged(sheet, enclosed, coloured, likely) if score >= AGREED else coloured
+    enclosed, score = _enclosed(background, likely)
+    return _merged(background, enclosed, coloured, likely) if score >= MIN_IOU else coloured
 
 
-def _merged(sheet: Sheet, enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
-    """What lines enclose, without what stands or lies beside the figure, and with what a gap in its outline lost."""
-    beside = _pieces(enclosed & ~coloured, likely, below=BESIDE)
+def _merged(background: PlainBackground, enclosed: BoolArray, coloured: BoolArray, likely: FloatArray) -> BoolArray:
+    """Merge: the region enclosed by lines, without objects beside the figure, with what a gap in its outline lost."""
+    beside = _pieces(enclosed & ~coloured, likely, below=EXCLUDE_BELOW)
     beside &= ~_bridges(beside, enclosed & ~beside)
-    # What has the ground's colour and is enclosed all the same is no shadow: a limb left blank between its lines.
-    beside &= ~_pieces(beside, (~_lines(sheet)).astype(np.float32), above=0.5)
-    lost = _pieces(coloured & ~enclosed, likely, above=LOST)
+    # An enclosed region of the background's colour is no shadow, but a limb left blank between its lines.
+    beside &= ~_pieces(beside, (~_lines(background)).astype(np.float32), above=0.5)
+    lost = _pieces(coloured & ~enclosed, likely, above=INCLUDE_ABOVE)
     return (enclosed & ~beside) | lost
 
 
 def _bridges(pieces: BoolArray, kept: BoolArray) -> BoolArray:
-    """The pieces of a mask that join two pieces of another: a forearm between sleeve and hand."""
+    """Pieces of a mask that join two pieces of another: a forearm between sleeve and hand."""
     regions, count = ndimage.label(pieces, np.ones((3, 3)))
     others, most = ndimage.label(kept, np.ones((3, 3)))
     if most < 2 or not count:
@@ -107,7 +108,7 @@ def _bridges(pieces: BoolArray, kept: BoolArray) -> BoolArray:
 
 
 def _pieces(mask: BoolArray, likely: FloatArray, below: float = 2.0, above: float = -1.0) -> BoolArray:
-    """The connected pieces of a mask whose mean likelihood lies between."""
+    """Connected pieces of a mask whose mean likelihood lies between `above` and `below`."""
     regions, count = ndimage.label(mask, np.ones((3, 3)))
     if not count:
         return np.zeros_like(mask)
@@ -116,14 +117,14 @@ def _pieces(mask: BoolArray, likely: FloatArray, below: float = 2.0, above: floa
     return np.asarray(np.isin(regions, index[(mean < below) & (mean > above)]))
 
 
-def plain_sheet(rgb: FloatArray, likely: FloatArray) -> Sheet | None:
-    """The ground as a smooth sheet (a quadratic in x and y); None where there is too little of it."""
-    ground = likely < 0.25
+def plain_background(rgb: FloatArray, likely: FloatArray) -> PlainBackground | None:
+    """Fit the background's colour by a quadratic in x and y; None where there is too little background."""
+    background = likely < 0.25
     height, width = likely.shape
-    rim = np.zeros_like(ground)
+    rim = np.zeros_like(background)
     reach = max(2, min(height, width) // 60)
     rim[:reach] = rim[-reach:] = rim[:, :reach] = rim[:, -reach:] = True
-    rows = np.flatnonzero((ground & (rim | (likely < 0.08))).ravel())
+    rows = np.flatnonzero((background & (rim | (likely < 0.08))).ravel())
     if len(rows) < 60:
         return None
     rows = rows[:: max(1, len(rows) // 6000)]
@@ -131,7 +132,7 @@ def plain_sheet(rgb: FloatArray, likely: FloatArray) -> Sheet | None:
     x, y = x / width - 0.5, y / height - 0.5
     base = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
     colours = rgb.reshape(-1, 3)[rows].astype(np.float64)
-    # From the commonest colour outwards: lines and scenery are left out step by step.
+    # Robust fit, from the commonest colour outwards: lines and scenery are excluded step by step.
     middle = _mode(colours)
     kept = np.abs(colours - middle).max(axis=1) < 40
     terms = 1
@@ -140,14 +141,14 @@ def plain_sheet(rgb: FloatArray, likely: FloatArray) -> Sheet | None:
             return None
         fit, *_ = np.linalg.lstsq(base[kept, :terms], colours[kept], rcond=None)
         rest = np.abs(colours - base[:, :terms] @ fit).max(axis=1)
-        noise = float(np.clip(1.5 * np.median(rest[kept]), 1.0, ROUGH))
+        noise = float(np.clip(1.5 * np.median(rest[kept]), 1.0, MAX_NOISE))
         kept = rest < max(4 * noise, 9)
     grid_y, grid_x = np.mgrid[:height, :width]
     gx, gy = (grid_x / width - 0.5).ravel(), (grid_y / height - 0.5).ravel()
     full = np.stack([np.ones_like(gx), gx, gy, gx * gx, gx * gy, gy * gy], axis=1)[:, :terms] @ fit
     away = np.abs(rgb - full.reshape(height, width, 3)).max(axis=2).astype(np.float32)
-    share = float((away < max(4 * noise, 12))[ground].mean()) if ground.any() else 0.0
-    return Sheet(away, noise, share)
+    share = float((away < max(4 * noise, 12))[background].mean()) if background.any() else 0.0
+    return PlainBackground(away, noise, share)
 
 
 def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -157,13 +158,13 @@ def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.median(colours[flat == values[counts.argmax()]], axis=0))
 
 
-def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
-    """What lines or colours enclose, for the gap width whose result agrees best with the guess; and how well."""
-    line = _lines(sheet)
+def _enclosed(background: PlainBackground, likely: FloatArray) -> tuple[BoolArray, float]:
+    """Region enclosed by lines or colours, for the gap width that agrees best with the guess; and its agreement."""
+    line = _lines(background)
     best, top = likely > 0.5, -1.0
     for gap in GAPS:
         found = _flooded(line, likely, gap)
-        found = _half_way(found, sheet.away)
+        found = _half_way(found, background.away)
         score = agreement(found, likely)
         # Wider bridges round off corners: they must earn it.
         if score > top + (0.01 if gap else 0):
@@ -171,15 +172,15 @@ def _enclosed(sheet: Sheet, likely: FloatArray) -> tuple[BoolArray, float]:
     return best, top
 
 
-def _lines(sheet: Sheet) -> BoolArray:
-    return np.asarray(sheet.away > max(5 * sheet.noise, FAINT))
+def _lines(background: PlainBackground) -> BoolArray:
+    return np.asarray(background.away > max(5 * background.noise, BACKGROUND_TOLERANCE))
 
 
 def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
-    """The figure: all that is not ground, where ground reaches the rim through gaps wider than 2 `gap`."""
+    """Foreground by flood fill: all that is not background, which reaches the rim through gaps wider than 2 `gap`."""
     barrier = grown(line, gap)
     free = ~np.pad(barrier, 1)
-    # A figure cut off by the rim is no way in for the ground.
+    # The background must not flood in where the rim cuts the figure off.
     free[0, 1:-1] = free[-1, 1:-1] = free[1:-1, 0] = free[1:-1, -1] = True
     rim_figure = np.pad(likely > 0.6, 1, mode="edge")
     inner = np.zeros_like(free)
@@ -199,14 +200,14 @@ def _flooded(line: BoolArray, likely: FloatArray, gap: int) -> BoolArray:
 
 
 def _half_way(figure: BoolArray, away: FloatArray) -> BoolArray:
-    """The figure without the paler half of its blurred rim: an edge is where a line has half of its strength."""
-    soft = away < 0.5 * ndimage.maximum_filter(away, 2 * BLUR + 1)
-    outside = ndimage.binary_dilation(~figure, iterations=BLUR, mask=soft | ~figure)
+    """Remove the paler half of the figure's blurred rim: an edge is where a line has half of its strength."""
+    soft = away < 0.5 * ndimage.maximum_filter(away, 2 * BLUR_PX + 1)
+    outside = ndimage.binary_dilation(~figure, iterations=BLUR_PX, mask=soft | ~figure)
     return np.asarray(~outside)
 
 
 def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:
-    """Without pieces that the network does not hold for the figure, and without what sticks out far from it."""
+    """Remove pieces that the network does not hold for foreground, and what sticks out far from it."""
     reach = max(3, round(0.045 * max(figure.shape)))
     away = ndimage.distance_transform_edt(likely < 0.3)
     near = figure & ((away < reach) | (likely > 0.06))
@@ -223,7 +224,7 @@ def _without_others(figure: BoolArray, likely: FloatArray) -> BoolArray:
 
 
 def _without_holes(figure: BoolArray, line: BoolArray, likely: FloatArray) -> BoolArray:
-    """With holes where the ground is seen through the figure: enclosed, of the ground's colour, unlikely."""
+    """Cut holes where the background shows through the figure: enclosed, of the background's colour, unlikely."""
     regions, count = ndimage.label(figure & ~line)
     if not count:
         return figure
@@ -234,7 +235,7 @@ def _without_holes(figure: BoolArray, line: BoolArray, likely: FloatArray) -> Bo
 
 
 def agreement(mask: BoolArray, likely: FloatArray) -> float:
-    """IoU of a mask with a guess, where pixels of which the guess is unsure count less."""
+    """IoU of a mask with a guess, weighted by the guess's confidence."""
     sure = np.abs(2 * likely - 1)
     guess = likely > 0.5
     either = float((sure * (mask | guess)).sum())

@@ -1,4 +1,4 @@
-"""The bones that a layer's middle follows: points of the drawing, their depths and how steeply they run in depth."""
+"""Bones that a layer's middle surface follows: points of the drawing, their depths and their slopes in depth."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.split import Split, head_radius
 from fig2mesh.skeleton import JOINT
 
-STEEPEST = 1.4
-"""Bones that run more steeply in depth than this (54 degrees) make their layer no thicker still."""
+MAX_SLOPE = 1.4
+"""Largest slope in depth of a bone (54 degrees); a steeper one makes its layer no thicker."""
 
-HANGING = 0.12
+MAX_CLOTH_SLOPE = 0.12
 """Largest slope in depth of cloth that hangs down."""
 
 SPINE_STEP = 0.05
 """Rows of a garment between two points of its middle, FIGURE units."""
 
 SHRUG = 0.5
-"""Share by which shoulders are nearer in depth to the thorax than their joints."""
+"""Share of the depth between shoulder joint and thorax by which shoulders are moved towards the thorax."""
 
 AT_HEM = 0.35
 """A leg leaves its garment within this share of half its width from the middle."""
@@ -30,7 +30,7 @@ AT_HEM = 0.35
 
 @dataclass(frozen=True)
 class Bones:
-    """Points that tell how deep a layer lies.
+    """Points that define the depth of a layer.
 
     points : (N, 2) float64, FIGURE x, y
     depth : (N,) float64, FIGURE z
@@ -54,15 +54,15 @@ class Bones:
 
 
 def slopes2(points: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N,) squared slope in depth along a chain, at most `STEEPEST` squared."""
+    """(N,) squared slope in depth along a chain, at most `MAX_SLOPE` squared."""
     if len(points) < 2:
         return np.zeros(len(points))
     length = np.linalg.norm(np.gradient(points, axis=0), axis=1)
-    return np.asarray(np.minimum((np.gradient(depth) / np.maximum(length, 1e-6)) ** 2, STEEPEST**2))
+    return np.asarray(np.minimum((np.gradient(depth) / np.maximum(length, 1e-6)) ** 2, MAX_SLOPE**2))
 
 
 def core_bones(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> Bones:
-    """The trunk, the head, the limbs that lie free of them, and the middle of a garment round the legs."""
+    """Bones of the trunk, the head, the limbs that lie free of them, and the middle of a garment round the legs."""
     in_core = [limb for limb in divided.limbs if all(limb is not layer.limb for layer in divided.layers)]
     # Under cloth that hangs about both legs nothing shows which hip is in front.
     hips = () if divided.garment.any() else ("l_hip", "r_hip")
@@ -82,7 +82,7 @@ def core_bones(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> B
 
 
 def _head(canvas: Canvas, joints: NDArray[np.float64]) -> Bones:
-    """A head is a ball: the whole of it lies as deep as its middle, however the neck leans."""
+    """Bones of the head, a ball: all of it lies as deep as its middle, however the neck leans."""
     middle = joints[JOINT["head"]]
     radius = 0.7 * head_radius(canvas, joints)
     angle = np.arange(8) * (np.pi / 4)
@@ -99,7 +99,7 @@ def hem_depth(divided: Split, joints: NDArray[np.float64], waist: float, drop: f
     below = [limb.depth[0] for limb in divided.limbs if limb.cloth]
     if not below:
         return waist
-    return float(np.clip(np.mean(below), waist - HANGING * drop, waist + HANGING * drop))
+    return float(np.clip(np.mean(below), waist - MAX_CLOTH_SLOPE * drop, waist + MAX_CLOTH_SLOPE * drop))
 
 
 def _garment(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> Bones:
@@ -122,7 +122,7 @@ def _garment(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> Bon
 
 
 def out_of_cloth(limb: Limb, canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> Limb:
-    """A leg that comes out of a garment, moved in depth to where it can hang out of it."""
+    """Move a leg that comes out of a garment in depth to where it can hang out of it."""
     rows = np.flatnonzero(divided.garment.any(axis=1))
     if not limb.cloth or not len(rows):
         return limb

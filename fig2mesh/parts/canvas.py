@@ -1,4 +1,4 @@
-"""The raster on which outlines are split and inflated: the silhouette at working resolution."""
+"""Raster on which outlines are split and inflated: the silhouette at working resolution."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fig2mesh.records import Figure
 CONTOUR_PX = 1024
 """Pictures are reduced to between this and twice this many pixels; finer would cost time and add pen jitter."""
 
-LEAST_CONTOUR_PX = 256
+MIN_CONTOUR_PX = 256
 """Smaller pictures are enlarged first: a limb of two pixels is still a limb."""
 
 MARGIN_PX = 4
@@ -25,21 +25,21 @@ PINHOLE = 0.005
 """Holes that are smaller than a square of this side are filled, share of the figure's longer side."""
 
 HAIR_PX = 0.9
-"""Half the width of the thinnest stroke, pixels of the contour's raster."""
+"""Least half width of a stroke, pixels of the contour's raster."""
 
-HELD = 1.4
-"""Strokes are drawn at least this many nodes of the part grids and pixels of the canvas wide. At 0.9 limbs of one drawn
+MIN_STROKE_WIDTH = 1.4
+"""Least width of a stroke, nodes of the part grids and pixels of the canvas. At 0.9 limbs of one drawn
 pixel fell into dozens of beads: with a radius of less than 0.6 of a node's distance, a slanted tube passes between."""
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """The silhouette on a raster of square pixels around the figure.
+    """Silhouette on a raster of square pixels around the figure.
 
     sdf : (H, W) float64, signed distance to the drawn contour in FIGURE units, negative inside
     labels : (H, W) uint8, part labels given by the user, 0 elsewhere
     corner : FIGURE x, y of the centre of pixel (0, 0)
-    pitch : FIGURE units a pixel
+    pitch : FIGURE units per pixel
     """
 
     sdf: NDArray[np.float64]
@@ -66,17 +66,17 @@ class Canvas:
         return np.stack([row, column], axis=-1)
 
     def sample(self, image: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Bilinear values of a canvas image at (..., 2+) FIGURE points; the border is continued."""
+        """Bilinear values of a canvas image at (..., 2+) FIGURE points; extrapolated by the border."""
         rows = self.pixels(points)
         flat = ndimage.map_coordinates(image, rows.reshape(-1, 2).T, order=1, mode="nearest")
         return np.asarray(flat).reshape(rows.shape[:-1])
 
 
 def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, voxel: float = 0.0) -> Canvas:
-    """The silhouette of a figure, resampled so that its longer side has `longest_px` pixels.
+    """Silhouette of a figure, resampled so that its longer side has `longest_px` pixels.
 
-    Strokes too thin for the canvas, or for part grids of spacing `voxel` (FIGURE units), are drawn `HELD` times as wide
-    as the coarser of the two.
+    Strokes too thin for the canvas, or for part grids of spacing `voxel` (FIGURE units), are drawn `MIN_STROKE_WIDTH`
+    times as wide as the coarser of the two.
 
     The contour is located to a fraction of a pixel: distances are measured on a raster of `CONTOUR_PX` and
     interpolated, so that a coarse canvas does not turn a slanted outline into stairs.
@@ -93,8 +93,8 @@ def make_canvas(figure: Figure, frame: ImageFrame, longest_px: int, voxel: float
     tall, wide = rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1
     step = max(tall, wide) / longest_px
     units = frame.units_per_px / scale
-    # Smoothing by itself breaks lines of one pixel, hence the least radius.
-    distance = np.minimum(distance, thicken(solid, max(0.5 * HELD * max(voxel / units, step), HAIR_PX)))
+    # Smoothing by itself breaks lines of one pixel, hence the minimum radius.
+    distance = np.minimum(distance, thicken(solid, max(0.5 * MIN_STROKE_WIDTH * max(voxel / units, step), HAIR_PX)))
     margin = MARGIN_PX * step
     height, width = (int(np.ceil((length + 2 * margin) / step)) + 1 for length in (tall, wide))
     row = rows[0] - margin + step * np.arange(height)
@@ -117,7 +117,7 @@ def raster_distance(region: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 
 def _without_pinholes(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Holes of a few pixels are faults of a mask; solids would have tunnels there."""
+    """Fill holes of a few pixels: they are faults of a mask, and solids would have tunnels there."""
     holes, count = ndimage.label(~solid)
     sizes = np.bincount(holes.ravel(), minlength=count + 1)
     limit = (PINHOLE * max(np.ptp(np.nonzero(solid), axis=1))) ** 2
@@ -137,7 +137,7 @@ def _contour_raster(mask: NDArray[np.bool_]) -> tuple[NDArray[np.float32], float
         image = Image.fromarray(np.where(mask, np.uint8(255), np.uint8(0))).reduce(factor)
         # The last row and column may be cut short; the padding of the mask is wider than what is lost there.
         return np.asarray(image, np.float32) / 255.0, 1.0 / factor
-    factor = -(-LEAST_CONTOUR_PX // longest)
+    factor = -(-MIN_CONTOUR_PX // longest)
     if factor == 1:
         return mask.astype(np.float32), 1.0
     axes = [(np.arange(length * factor) + 0.5) / factor - 0.5 for length in mask.shape]

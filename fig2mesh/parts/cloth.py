@@ -1,4 +1,4 @@
-"""Legs under cloth: which circles of a leg a skirt, robe or gown hides, and legs that come out of it."""
+"""Legs under cloth: the circles of a leg hidden by a skirt, robe or gown, and legs that come out of it."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from fig2mesh.records import BoolArray
 from fig2mesh.skeleton import JOINT, PART
 
 CLOTHED = 4
-"""Circles of a leg that cloth covers before the rest of the leg becomes a layer of its own that comes out of it."""
+"""Least number of circles of a leg under cloth for the rest of it to become a layer that comes out of the cloth."""
 
 
 NARROWER = 0.65
-"""Such a leg is narrower than this share of the cloth above it."""
+"""Largest width of such a leg, share of the width of the cloth above it."""
 
 
 REACH_UNDER = 3
-"""Circles that such a leg goes on under the cloth."""
+"""Circles by which such a leg is continued under the cloth."""
 
 
 def shortened(covered: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """What is covered without its end: a leg goes on a little way under its cloth."""
+    """Covered circles without the last few: a leg is continued a little under its cloth."""
     result = covered.copy()
     result[: len(covered) - REACH_UNDER] &= covered[REACH_UNDER:]
     result[len(covered) - REACH_UNDER :] &= covered.all()
@@ -42,7 +42,7 @@ def steps_out(limb: Limb, covered: NDArray[np.bool_]) -> bool:
 
 
 def clothed(bare: Limb, covered: NDArray[np.bool_]) -> Limb:
-    """A leg that comes out of cloth; under it, where only the cloth can be measured, as thick as just below."""
+    """Leg that comes out of cloth; under it, where only the cloth can be measured, as thick as just below."""
     under = len(bare.points) - int((~covered).sum())
     radius = bare.radius.copy()
     radius[:under] = np.median(radius[under : under + REACH_UNDER])
@@ -50,7 +50,7 @@ def clothed(bare: Limb, covered: NDArray[np.bool_]) -> Limb:
 
 
 def keep(limb: Limb, chosen: NDArray[np.bool_]) -> Limb | None:
-    """The limb reduced to some of its circles; None where fewer than two are left."""
+    """Reduce a limb to some of its circles; None where fewer than two are left."""
     if chosen.all():
         return limb
     if chosen.sum() < 2:
@@ -63,7 +63,7 @@ def keep(limb: Limb, chosen: NDArray[np.bool_]) -> Limb | None:
 
 
 def under_cloth(limb: Limb, twin: Limb, visible: BoolArray) -> NDArray[np.bool_]:
-    """Which circles of a leg hang under a skirt, robe or gown.
+    """(N,) bool: circles of a leg under a skirt, robe or gown.
 
     Cloth fills the space between the legs. A leg that hangs down is covered where its inner side has no contour of its
     own and either its outer side is far wider than a leg, or the drawing hides the knee although no other leg is in
@@ -105,7 +105,7 @@ def under_cloth(limb: Limb, twin: Limb, visible: BoolArray) -> NDArray[np.bool_]
 
 
 def labelled_cloth(limb: Limb, canvas: Canvas) -> NDArray[np.bool_]:
-    """Which circles of a leg the label `garment` covers: from the hip down to the last one that has it."""
+    """(N,) bool: circles of a leg under the label `garment`, from the hip down to the last labelled one."""
     rows, columns = np.round(canvas.pixels(limb.points)).astype(int).T
     height, width = canvas.labels.shape
     there = canvas.labels[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)] == PART["garment"]
@@ -114,7 +114,7 @@ def labelled_cloth(limb: Limb, canvas: Canvas) -> NDArray[np.bool_]:
 
 
 def same_hem(limbs: list[Limb], covered: dict[str, NDArray[np.bool_]]) -> dict[str, NDArray[np.bool_]]:
-    """Cloth that covers one leg covers the other down to the same height, where that one has no contour of its own."""
+    """Extend cloth from one leg to the other, down to the same height, where that one has no contour of its own."""
     result = dict(covered)
     for limb, twin in zip(limbs, twins(limbs), strict=True):
         if limb.is_arm or covered[limb.name].any() or not steps_out(twin, covered[twin.name]):

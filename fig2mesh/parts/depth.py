@@ -12,14 +12,14 @@ from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import Limb
 
 STRIDE = 5
-"""Depth varies slowly: it is interpolated on every fifth pixel."""
+"""Stride of interpolation, pixels: depth varies slowly."""
 
 REST = 0.35
 """A limb's axis keeps this share of its radius clear of the surface it rests on; the rest of it sinks in, so that
 what touches in the drawing is joined in space."""
 
 SOFTNESS = 0.03
-"""Distance within which a bone's depth holds, FIGURE units; also the spread of the smoothing after."""
+"""Distance within which a bone's depth applies, FIGURE units; also the standard deviation of the smoothing after it."""
 
 
 def mid_surface(canvas: Canvas, points: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -51,8 +51,8 @@ def place_limb(
 
     Parameters
     ----------
-    top, bottom : (H, W) FIGURE z of what is already there, NaN where nothing is
-    behind : put the unseen bones of the limb behind instead of in front
+    top, bottom : (H, W) FIGURE z of the layers placed so far, NaN elsewhere
+    behind : put the hidden bones of the limb behind instead of in front
     """
     nearest = np.round(canvas.pixels(limb.points)).astype(int)
     rows = np.clip(nearest[:, 0], 0, top.shape[0] - 1)

@@ -56,7 +56,7 @@ def polygon_distance(points: NDArray[np.float64], corners: NDArray[np.float64]) 
 
 
 def closing(image: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
-    """Morphological closing by a disc, by distances: its cost does not grow with the radius (pixels)."""
+    """Morphological closing by a disc, using distances: its cost does not grow with the radius (pixels)."""
     pad = int(radius) + 2
     grown = ndimage.distance_transform_edt(~np.pad(image, pad)) <= radius
     return np.asarray((ndimage.distance_transform_edt(grown) > radius)[pad:-pad, pad:-pad])

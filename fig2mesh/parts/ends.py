@@ -1,7 +1,7 @@
 """Flat ends: the hem of a gown, the soles of feet that stand.
 
 An inflated outline is round at its rim. Where the rim is the end of a tube of cloth, or where a foot meets the ground,
-that would make a wedge of it. There the outline is inflated as if it went on downwards, and cut off flat.
+that would make a wedge of it. There the outline is inflated as if it continued downwards, and cut off flat.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from scipy import ndimage
 from fig2mesh.parts.canvas import Canvas, raster_distance
 
 DOWN = 0.65
-"""Rims that look down at least this much (cosine) are ends; the others are sides."""
+"""Threshold, cosine of a rim's normal with the downward direction, above which the rim is an end; others are sides."""
 
 SCALLOP = 0.03
-"""Gaps in an end up to about twice this wide are bridged: hems wave, FIGURE units."""
+"""Half width of gaps in an end that are bridged, as hems wave, FIGURE units."""
 
 HEM_BLUR = 0.012
 """Smoothing of ends inside the silhouette: the stairs of pixels would become teeth, FIGURE units."""
 
-LEAST_WIDTH = 0.03
-"""Narrower ends are points, FIGURE units."""
+MIN_WIDTH = 0.03
+"""Least width of an end, FIGURE units; narrower ends are points."""
 
 FURTHER = 0.6
-"""How far an outline goes on below its end, in widths of the end; no further than what is above it is high."""
+"""Length of the continuation below an end, in widths of the end; at most the height of what is above it."""
 
 
 @dataclass(frozen=True)
 class Ends:
-    """What an outline goes on with below its flat ends.
+    """Continuation of an outline below its flat ends.
 
     beyond : (H + extra, W) bool, the continuation; rows below the canvas are `extra`
-    source : (W,) int, in each column the row whose label goes on, -1 where there is no end
+    source : (W,) int, in each column the row whose label is continued, -1 where there is no end
     extra : rows
     """
 
@@ -45,7 +45,7 @@ class Ends:
 
 
 def flat_ends(canvas: Canvas, region: NDArray[np.bool_], chosen: NDArray[np.bool_]) -> Ends | None:
-    """The flat ends of a layer; None where it has none.
+    """Flat ends of a layer; None where it has none.
 
     region : (H, W) bool, the layer; chosen : (H, W) bool, the pixels of it that may end flat
     """
@@ -64,7 +64,7 @@ def flat_ends(canvas: Canvas, region: NDArray[np.bool_], chosen: NDArray[np.bool
     for piece, window in enumerate(ndimage.find_objects(pieces), start=1):
         here, left = rim[window] & (pieces[window] == piece), window[1].start
         columns = np.flatnonzero(here.any(axis=0))
-        if not len(columns) or np.ptp(columns) * canvas.pitch < LEAST_WIDTH:
+        if not len(columns) or np.ptp(columns) * canvas.pitch < MIN_WIDTH:
             continue
         # The lowest rim pixel of each column; gaps between columns are bridged by their neighbours.
         lowest = window[0].start + here.shape[0] - 1 - np.argmax(here[::-1][:, columns], axis=0)
@@ -85,7 +85,7 @@ def flat_ends(canvas: Canvas, region: NDArray[np.bool_], chosen: NDArray[np.bool
 
 
 def _run(column: NDArray[np.bool_]) -> int:
-    """Pixels set without a gap at the end of a column."""
+    """Number of pixels set without a gap at the end of a column."""
     gaps = np.flatnonzero(~column)
     return len(column) - 1 - (int(gaps[-1]) if len(gaps) else -1)
 

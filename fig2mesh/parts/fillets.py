@@ -1,7 +1,7 @@
-"""Fillets between the layers: what grows out of a body does so in a curve, what only rests against it does not.
+"""Fillets between layers, where a part grows out of the body, and none where it only rests against it.
 
-Parts of one layer share one surface. Kinematic neighbours of different layers melt together, but not at the drawn
-contour, which stays as it is; a hand on a hip keeps its crease.
+Parts of one layer share one surface. Kinematic neighbours of different layers are blended, but not at the drawn
+contour, which is unchanged; a hand on a hip keeps its crease.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from fig2mesh.records import PartSdf
 from fig2mesh.skeleton import PART, PART_NEIGHBOURS, SIDES
 
 RADIUS = 0.04
-"""Surfaces nearer to each other than this melt together, FIGURE units; less where a part is thinner."""
+"""Blend radius, FIGURE units: surfaces nearer to each other than this are blended; less where a part is thinner."""
 
 NEIGHBOURS = PART_NEIGHBOURS | {
     frozenset((PART["garment"], PART[f"{side}_{leg}"])) for side in SIDES for leg in ("upper_leg", "lower_leg")
 }
-"""Pairs of part labels between which fillets are laid."""
+"""Pairs of part labels that get fillets."""
 
 
 def make_fillets(
@@ -30,7 +30,7 @@ def make_fillets(
 ) -> tuple[tuple[int, int, PartSdf], ...]:
     """(first, second, fillet) for all pairs of kinematic neighbours in different layers.
 
-    layer_of : for each part the number of its layer
+    layer_of : layer number of each part
     """
     thickness = [-float(part.grid.min()) for part in parts]
     found = []
@@ -46,7 +46,7 @@ def make_fillets(
 
 
 def within(canvas: Canvas, fillet: PartSdf, radius: float) -> PartSdf:
-    """A fillet that shrinks to nothing towards the drawn contour: it is a quarter of its radius deep at most."""
+    """Shrink a fillet to nothing towards the drawn contour: it is at most a quarter of its radius deep."""
     axis = np.linspace(-fillet.edge / 2, fillet.edge / 2, fillet.grid.shape[0])
     columns = np.stack(np.meshgrid(fillet.centre[0] + axis, fillet.centre[1] + axis, indexing="ij"), axis=-1)
     share = np.clip(-canvas.sample(canvas.sdf, columns) / radius, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Strokes too thin for the grids: made just thick enough that they neither vanish nor fall apart."""
+"""Thickening of strokes too thin for the grids, so that they neither vanish nor break."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ EIGHT = np.ones((3, 3))
 def thicken(mask: NDArray[np.bool_], radius: float) -> NDArray[np.float64]:
     """Distance to the middle lines of everything thinner than `radius` pixels from middle to rim.
 
-    Corners are thin too at their very tip; they are left alone. What counts are strokes: residues of a morphological
-    opening that join two pieces or are longer than they are wide.
+    Corners are thin at their tips too, and are left unchanged. Strokes are the residues of a morphological opening that
+    join two pieces or are longer than they are wide.
 
     Returns
     -------

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-3
 """Residual relative to the right-hand side at which the solver stops; 0.1 % of u is 0.05 % of the thickness."""
 
-LEAST_SHARE = 0.05
-"""A rim nearer to a pixel centre counts as this near, pixels: the equations stay well conditioned."""
+MIN_SHARE = 0.05
+"""Least distance of the rim from a pixel centre, pixels, which keeps the equations well conditioned."""
 
-COARSEST_PX = 24
-MOST_ITERATIONS = 400
+MIN_COARSE_PX = 24
+MAX_ITERATIONS = 400
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def inflate(
     inside : (H, W) bool
     load : (H, W), positive
     device : PyTorch device
-    distance : (H, W) signed distance in any unit, negative inside: where between pixel centres the rim lies; without it
+    distance : (H, W) signed distance in any unit, negative inside: locates the rim between pixel centres; without it
         the rim runs through the outermost pixels outside, and u carries their stairs far into the outline
 
     Returns
@@ -85,9 +85,9 @@ def inflate(
 
 
 def _own_weight(inside: NDArray[np.bool_], distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(H, W) weight of each pixel itself in −Δu: a rim nearer than the next pixel holds it more firmly.
+    """(H, W) diagonal weight of each pixel in −Δu: larger where the rim is nearer than the next pixel.
 
-    The symmetric scheme of Gibou et al. (2002), second order in the place of the rim.
+    The symmetric scheme of Gibou et al. (2002), second order in the position of the rim.
     """
     weight = np.full(inside.shape, 4.0)
     for axis in (0, 1):
@@ -95,7 +95,7 @@ def _own_weight(inside: NDArray[np.bool_], distance: NDArray[np.float64]) -> NDA
             beyond = np.roll(distance, step, axis)
             share = distance / np.minimum(distance - beyond, -1e-12)
             leaves = inside & ~np.roll(inside, step, axis)
-            weight[leaves] += 1.0 / np.clip(share, LEAST_SHARE, 1.0)[leaves] - 1.0
+            weight[leaves] += 1.0 / np.clip(share, MIN_SHARE, 1.0)[leaves] - 1.0
     return weight
 
 
@@ -114,7 +114,7 @@ def _solve(domain: torch.Tensor, force: torch.Tensor, own: torch.Tensor | float 
     from torch.nn import functional
 
     guess = torch.zeros_like(force)
-    if min(domain.shape) > COARSEST_PX:
+    if min(domain.shape) > MIN_COARSE_PX:
         pooled = functional.avg_pool2d(torch.stack([domain, force])[:, None], 2, ceil_mode=True)[:, 0]
         coarse_domain = (pooled[0] > 0.5).float()
         # The coarse pixel is twice as wide, so the same load weighs four times as much.
@@ -125,7 +125,7 @@ def _solve(domain: torch.Tensor, force: torch.Tensor, own: torch.Tensor | float 
     direction = residual.clone()
     energy = torch.sum(residual * residual)
     limit = TOLERANCE**2 * float(torch.sum(force * force))
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         if float(energy) <= limit:
             break
         image = _laplacian(direction, domain, own)

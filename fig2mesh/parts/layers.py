@@ -1,4 +1,4 @@
-"""The layers of a drawing in depth: completed outlines, inflated around a middle surface that follows the joints."""
+"""Layers of a drawing in depth: completed outlines, inflated around a middle surface that follows the joints."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from fig2mesh.parts.bones import Bones, core_bones, out_of_cloth
 from fig2mesh.parts.canvas import Canvas, raster_distance
+from fig2mesh.parts.cross_section import CrossSection, measure_cross_section
 from fig2mesh.parts.depth import mid_surface, place_limb
 from fig2mesh.parts.distances import closing
 from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
@@ -17,7 +18,6 @@ from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.parts.loads import load_of, part_loads
-from fig2mesh.parts.profile import Profile, measure_profile
 from fig2mesh.parts.props import prop_depth
 from fig2mesh.parts.rim import RIM_BLUR, extended, rim_distance
 from fig2mesh.parts.split import Layer, Split
@@ -25,23 +25,24 @@ from fig2mesh.records import PartSdf
 from fig2mesh.skeleton import JOINT, PART
 
 STANDING_FOOT_UNITS = 0.12
-"""Feet whose tip is at most this far above the lowest point of the figure stand on the ground, FIGURE units."""
+"""Largest height of a standing foot's tip above the lowest point of the figure, FIGURE units."""
 
 NOOK = 0.045
-"""Nooks of a head's outline up to twice this wide do not show in its depth, FIGURE units."""
+"""Half width of the nooks of a head's outline that are left out of its depth, FIGURE units."""
 
 _FLAT = Bones(np.zeros((1, 2)), np.zeros(1), np.zeros(1))
 
 ATTEMPTS = 6
-"""Each brings floating limbs half way back to the middle of the body; the last one all the way."""
+"""Number of attempts to join floating limbs: each moves them half way back to the middle of the body, the last one all
+the way."""
 
-REACH_IN = 0.012
-"""How much further a limb that floats reaches into its neighbours with each attempt, FIGURE units."""
+REACH_STEP = 0.012
+"""Growth of a floating limb into its neighbours with each attempt, FIGURE units."""
 
 
 @dataclass(frozen=True)
 class LayerSurface:
-    """A layer in depth: it fills z0 − √u … z0 + √u.
+    """Layer in depth: it fills z0 − √u … z0 + √u.
 
     u : (H, W) float64, squared half thickness in FIGURE units², negative outside the outline
     z0 : (H, W) float64, FIGURE z of its middle
@@ -62,14 +63,14 @@ def raise_layers(
     device: str,
     fields: tuple[PartSdf, ...] = (),
 ) -> tuple[LayerSurface, ...]:
-    """The layers of a split figure in depth, the core first.
+    """Layers of a split figure in depth, the core first.
 
     Parameters
     ----------
     joints : (21, 3) float64, FIGURE
     device : PyTorch device of the inflation
-    fields : what networks made of the parts; the layers take their thickness and their place before or behind the
-        bones from them, and keep the drawn outline
+    fields : parts made by networks; the layers take their thickness and their offset from the bones from them, and keep
+        the drawn outline
     """
     loads = part_loads(joints)
     core, *others = divided.layers
@@ -113,7 +114,7 @@ def raise_layers(
 
 
 class _Inflation:
-    """Layers and their bones to surfaces; what networks say of a layer is measured once."""
+    """Inflation of layers around their bones; the networks' cross-section of a layer is measured once."""
 
     def __init__(
         self,
@@ -124,21 +125,23 @@ class _Inflation:
         fields: tuple[PartSdf, ...],
     ) -> None:
         self.canvas, self.loads, self.flat, self.device, self.fields = canvas, loads, flat, device, fields
-        self.profiles: dict[str, Profile | None] = {}
+        self.cross_sections: dict[str, CrossSection | None] = {}
 
     def __call__(self, layer: Layer, bones: Bones) -> LayerSurface:
         canvas = self.canvas
-        if layer.name not in self.profiles:
+        if layer.name not in self.cross_sections:
             # The networks' parts lie where the joints are, also where the limb has been moved since.
-            self.profiles[layer.name] = self._profile(layer, bones if layer.limb is None else Bones.of(layer.limb))
-        profile = self.profiles[layer.name]
+            self.cross_sections[layer.name] = self._cross_section(
+                layer, bones if layer.limb is None else Bones.of(layer.limb)
+            )
+        cross_section = self.cross_sections[layer.name]
         ends = flat_ends(canvas, layer.region, np.isin(layer.labels, self.flat))
         rim = rim_distance(canvas, layer.region, ends)
         u = self._raised(layer.region, layer.labels, bones, ends, rim)
         u = extended(rim[: len(u)], u, canvas.pitch)
         z0 = mid_surface(canvas, bones.points, bones.depth)
-        if profile is not None:
-            u, z0 = u * profile.ratio, z0 + profile.offset
+        if cross_section is not None:
+            u, z0 = u * cross_section.ratio, z0 + cross_section.offset
         return LayerSurface(u, z0, layer.labels, None if ends is None else clip_distance(canvas, layer.region, ends))
 
     def _raised(
@@ -166,7 +169,7 @@ class _Inflation:
     def _without_grooves(
         self, region: NDArray[np.bool_], labels: NDArray[np.uint8], u: NDArray[np.float64], rim: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """A head whose nooks (below a nose, between locks of hair) stay at its rim instead of running across it.
+        """Inflate a head so that its nooks (below a nose, between locks of hair) stay at its rim and do not run across.
 
         The head is inflated with its nooks filled, and brought to zero at the drawn rim by the ratio of the distances
         to the two rims: 1 where they agree, and nearly 1 from twice a nook's depth inwards.
@@ -182,19 +185,19 @@ class _Inflation:
         weight = ndimage.gaussian_filter(head.astype(float), NOOK / pitch)
         return np.asarray(np.where(rim < 0, u + weight * (np.maximum(u, smooth * share) - u), 0.0))
 
-    def _profile(self, layer: Layer, bones: Bones) -> Profile | None:
-        """What the networks say of a layer; None where they know none of its parts."""
+    def _cross_section(self, layer: Layer, bones: Bones) -> CrossSection | None:
+        """Cross-section of a layer by the networks; None where they have none of its parts."""
         canvas = self.canvas
         own = [field for field in self.fields if (layer.labels == field.part).any()]
         if not own:
             return None
         reference = self._raised(layer.region, layer.labels, bones, None, rim_distance(canvas, layer.region, None))
         bone = mid_surface(canvas, bones.points, bones.depth)
-        return measure_profile(canvas, layer.labels, own, reference, bone)
+        return measure_cross_section(canvas, layer.labels, own, reference, bone)
 
 
 def _may_end_flat(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """Labels of what may end flat: garments that legs come out of or that hide them, feet that stand on the ground."""
+    """Labels of pixels that may end flat: garments that legs come out of or that hide them, feet on the ground."""
     ground = canvas.points()[canvas.inside][:, 1].min()
     highest = ground + STANDING_FOOT_UNITS
     standing = [
@@ -214,7 +217,7 @@ def _joined(
     surfaces: list[LayerSurface],
     make: _Inflation,
 ) -> tuple[LayerSurface, ...]:
-    """The surfaces with floating limbs brought back towards the middle of the body until they hold."""
+    """Move floating limbs back towards the middle of the body until they are joined."""
     for attempt in range(ATTEMPTS):
         loose = _floating(canvas, surfaces)
         if not loose:
@@ -244,21 +247,21 @@ def _floating(canvas: Canvas, surfaces: list[LayerSurface]) -> set[int]:
 
 
 def _grown(canvas: Canvas, layer: Layer) -> Layer:
-    """The layer reaching further into its neighbours, within the silhouette."""
+    """Grow a layer into its neighbours, within the silhouette."""
     distance, nearest = ndimage.distance_transform_edt(~layer.region, sampling=canvas.pitch, return_indices=True)
-    region = (distance < REACH_IN) & canvas.inside
+    region = (distance < REACH_STEP) & canvas.inside
     return replace(layer, region=region, labels=np.where(region, layer.labels[tuple(nearest)], np.uint8(0)))
 
 
 def _drawn_order(layer: Layer) -> tuple[bool, float, float]:
-    """Legs before arms; of two legs first the one that the drawing hides, else the one further up (further away)."""
+    """Sort key of layers: legs before arms; of two legs first a hidden one, else the higher (farther) one."""
     limb: Limb | None = layer.limb
     assert limb is not None
     return limb.is_arm, float(limb.seen.mean()), -float(limb.points[-1, 1])
 
 
 def _within(surface: LayerSurface, pitch: float, top: NDArray[np.float64], bottom: NDArray[np.float64]) -> LayerSurface:
-    """A leg kept inside of the cloth that it comes out of, a little below its surface."""
+    """Keep a leg inside the cloth that it comes out of, a little below its surface."""
     front, back = _extent(surface)
     lower, upper = np.fmin(front, top - pitch), np.fmax(back, bottom + pitch)
     there = np.isfinite(top) & np.isfinite(front)
@@ -271,7 +274,7 @@ def _within(surface: LayerSurface, pitch: float, top: NDArray[np.float64], botto
 
 
 def _extent(surface: LayerSurface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    # Beyond a flat end the layer only seems to go on.
+    # Beyond a flat end the layer is cut off.
     there = (surface.u > 0) & (True if surface.clip is None else surface.clip < 0)
     half = np.where(there, np.sqrt(np.maximum(surface.u, 0.0)), np.nan)
     return surface.z0 + half, surface.z0 - half

@@ -21,13 +21,13 @@ USUAL_RADIUS = {
     "upper_arm": 0.055, "lower_arm": 0.045, "hand": 0.045, "upper_leg": 0.085, "lower_leg": 0.060, "foot": 0.050
 }
 # fmt: on
-"""Radii of a realistic body 1.79 units high; drawn ones are measured, these only bound them."""
+"""Radii of a realistic body 1.79 units high, which bound the measured ones."""
 
 STOUT = 1.7
-"""Limbs with one free side count as limbs up to this multiple of the usual radius; what is wider is cloth."""
+"""Largest radius of a limb with one free side, in usual radii; what is wider is cloth."""
 
 REACH = 0.30
-"""How far sideways a limb's contour is looked for, FIGURE units."""
+"""Search distance sideways for a limb's contour, FIGURE units."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,11 @@ class Limb:
     radius : (N,) float64, FIGURE units
     usual : (N,) float64, radius a realistic body would have there
     part : (N,) uint8, part label of each circle
-    ends : (N, 2) bool, whether the silhouette ends to the limb's left and right before anything else of the body
-    free : (N, 2) bool, the same where that end is near enough to be the limb's own contour
+    ends : (N, 2) bool, True where the silhouette ends to the limb's left and right before anything else of the body
+    free : (N, 2) bool, True where that end is near enough to be the limb's own contour
     width : (N, 2) float64, free length to the left and right, capped
     seen : (N,) bool, False between joints of which one is hidden
-    cloth : whether it comes out of a garment that covers its upper part
+    cloth : True if it comes out of a garment that covers its upper part
     """
 
     name: str
@@ -85,15 +85,15 @@ class Limb:
 
 
 ENOUGH = 0.3
-"""Share of a limb's circles that must have been measured for the others to follow them."""
+"""Least share of measured circles from which the other circles of a limb are filled in."""
 
 
 ALIKE = 0.8
-"""Where one side of a limb is hidden it is at least this thick compared with its twin."""
+"""Least thickness relative to its twin of a limb with one hidden side."""
 
 
 def make_limb(name: str, joints: NDArray[np.float64], visible: BoolArray) -> Limb:
-    """The chain of a limb from (21, 3) FIGURE joints, with usual radii and nothing measured yet."""
+    """Chain of a limb from (21, 3) FIGURE joints, with usual radii and nothing measured yet."""
     side, kind = name.split("_")
     centres, depth, usual, part, seen = [], [], [], [], []
     chain = [JOINT[f"{side}_{joint}"] for joint in LIMB_JOINTS[kind]]
@@ -134,7 +134,7 @@ def measure(limb: Limb, canvas: Canvas, rivals: NDArray[np.float64]) -> Limb:
     # A bone of no length has no direction; across any line will do.
     tangent = np.where(length > 1e-9, tangent / np.maximum(length, 1e-9), [0.0, 1.0])
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    most = STOUT * limb.usual
+    max_radius = STOUT * limb.usual
     reach = np.arange(0.0, REACH, canvas.pitch)
     ends = np.zeros((len(limb.points), 2), bool)
     width = np.zeros((len(limb.points), 2))
@@ -148,7 +148,7 @@ def measure(limb: Limb, canvas: Canvas, rivals: NDArray[np.float64]) -> Limb:
         width[:, side] = np.minimum(leaves, meets) * canvas.pitch
     # A side that is free is the limb's own contour unless it is far off: cloth. Between two free sides lies a limb,
     # however stout it is drawn.
-    usable = ends & ((width <= most[:, None]) | ends.all(axis=1, keepdims=True))
+    usable = ends & ((width <= max_radius[:, None]) | ends.all(axis=1, keepdims=True))
     count = usable.sum(axis=1)
     known = count > 0
     measured = np.where(known, (width * usable).sum(1) / np.maximum(count, 1), np.nan)
@@ -156,7 +156,7 @@ def measure(limb: Limb, canvas: Canvas, rivals: NDArray[np.float64]) -> Limb:
 
 
 def stoutness(limbs: list[Limb]) -> float:
-    """How thick the figure's limbs are drawn: median of measured over usual radius; 0.8 where none was measured."""
+    """Stoutness of the drawn limbs: median of measured over usual radius; 0.8 where none was measured."""
     ratios = np.concatenate([limb.radius / limb.usual for limb in limbs])
     ratios = ratios[np.isfinite(ratios) & (ratios > 0)]
     return float(np.median(ratios)) if len(ratios) else 0.8
@@ -185,6 +185,6 @@ def complete(limb: Limb, twin: Limb, stout: float, pitch: float) -> Limb:
 
 
 def twins(limbs: list[Limb]) -> list[Limb]:
-    """The limb of the other side for each limb."""
+    """Limb of the other side for each limb."""
     by_name = {limb.name: limb for limb in limbs}
     return [by_name[("r" if limb.name[0] == "l" else "l") + limb.name[1:]] for limb in limbs]

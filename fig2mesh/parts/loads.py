@@ -1,4 +1,4 @@
-"""Right-hand sides of the inflation: how thick each part of a layer becomes."""
+"""Right-hand sides of the inflation, which set the thickness of each part of a layer."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ two thirds as deep as wide, a head nearly a ball."""
 
 
 FRONTAL_FOOT = 4.0
-"""What a foot that points to the viewer has on top of that: it is longer than the drawing shows it wide."""
+"""Additional load of a foot that points to the viewer: it is longer than it is drawn wide."""
 
 
 def part_loads(joints: NDArray[np.float64]) -> NDArray[np.float64]:

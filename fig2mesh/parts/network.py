@@ -2,7 +2,7 @@
 
 Each part gets its 64 x 64 mask, cut out of the drawing in the square of its PART cube, and its anchor joints. The size
 of the cube follows from both (§4.3). A part that the drawing hides has an empty mask: its shape comes from the pose
-alone, its size from its twin where that is seen.
+alone, its size from its twin where that is visible.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ MASK = 64
 NODES = 64
 """The paper's grids (§4.2); depth alone needs fewer, because columns are cut between nodes."""
 
-LEAST_PIXELS = 6
-"""Parts of which the drawing shows less count as hidden."""
+MIN_PIXELS = 6
+"""Least number of visible pixels of a part; parts with fewer count as hidden."""
 
 ROOM = 1.04
-"""A cube is at least this much larger than what is drawn of its part."""
+"""Least ratio of a cube's edge to the drawn size of its part."""
 
-LEAST_EDGE = 0.03
+MIN_EDGE = 0.03
 
-MOST_CLOTH = 0.3
-"""Hidden parts with a larger share of their picture under cloth are left out."""
+MAX_CLOTH = 0.3
+"""Largest share under cloth of a hidden part; parts with more are left out."""
 
-LEAST_CONTACT = 8
-"""Nodes of a hidden part that must lie inside another: fewer would hold it by a thread."""
+MIN_CONTACT = 8
+"""Least number of nodes of a hidden part inside another one: fewer would hold it by a thread."""
 
 
 def network_parts(
@@ -53,7 +53,7 @@ def network_parts(
     sizes: Mapping[str, PartSizeNet],
     nodes: int = NODES,
 ) -> tuple[PartSdf, ...]:
-    """The fields of all 14 parts on grids of `nodes` nodes an edge, FIGURE, in the order of their labels.
+    """Fields of all 14 parts on grids of `nodes` nodes per edge, FIGURE, in the order of their labels.
 
     joints : (21, 3) FIGURE
     nets, sizes : networks by kind
@@ -76,7 +76,7 @@ def network_parts(
 
 
 class PartInput(NamedTuple):
-    """What a network is asked: mask (64, 64) bool; anchors (A, 3) PART; centre (3,) and edge of the cube, FIGURE."""
+    """Input of a part network: mask (64, 64) bool; anchors (A, 3) PART; centre (3,) and edge of the cube, FIGURE."""
 
     mask: BoolArray
     anchors: NDArray[np.float64]
@@ -87,7 +87,7 @@ class PartInput(NamedTuple):
 def network_inputs(
     canvas: Canvas, divided: Split, joints: NDArray[np.float64], sizes: Mapping[str, PartSizeNet]
 ) -> dict[int, PartInput]:
-    """By label what each part's network is asked."""
+    """Input of each part's network, by label."""
     regions = {part: part_region(divided, part) for part in BODY_PARTS}
     return {
         part: PartInput(
@@ -101,11 +101,11 @@ def network_inputs(
 
 
 def part_region(divided: Split, part: int) -> BoolArray:
-    """(H, W) bool: where a part is, also behind others as far as its layer's outline was completed."""
+    """(H, W) bool: region of a part, also behind others as far as its layer's outline was completed."""
     region = np.zeros(divided.labels.shape, bool)
     for layer in divided.layers:
         region |= layer.labels == part
-    return region if region.sum() >= LEAST_PIXELS else np.zeros_like(region)
+    return region if region.sum() >= MIN_PIXELS else np.zeros_like(region)
 
 
 def part_cubes(
@@ -123,7 +123,7 @@ def part_cubes(
         _, edge = part_size(sizes[PART_KIND[part]], part, joints, drawn)
         if len(own):
             edge = max(edge, 2.0 * ROOM * float(np.abs(own - centre[:2]).max() + canvas.pitch))
-        result[part] = (centre, max(edge, LEAST_EDGE))
+        result[part] = (centre, max(edge, MIN_EDGE))
     for part, region in regions.items():
         twin = next((p for p in BODY_PARTS if PART_KIND[p] == PART_KIND[part] and p != part), None)
         if not region.any() and twin is not None and regions[twin].any():
@@ -147,7 +147,7 @@ def part_mask(canvas: Canvas, region: BoolArray, centre: NDArray[np.float64], ed
 def part_inference(
     pose: Pose3D, nodes: int = NODES, device: str = "cpu", precision: str = "float32"
 ) -> Callable[[Canvas, Split], tuple[PartSdf, ...]]:
-    """`network_parts` with the networks that come with the package, loaded once a process.
+    """`network_parts` with the networks that come with the package, loaded once per process.
 
     precision : "float32", or "bfloat16" for matrix products where that loses little
     """
@@ -167,7 +167,7 @@ def part_inference(
 
 
 def shipped_sizes() -> dict[str, PartSizeNet]:
-    """The size networks that come with the package, by kind, loaded once a process."""
+    """Size networks that come with the package, by kind, loaded once per process."""
     from fig2mesh.nets.part_size import SIZE_WEIGHTS, SizeShape
 
     return {kind: SIZE_WEIGHTS.shipped(SizeShape(kind)) for kind in KINDS}
@@ -176,12 +176,12 @@ def shipped_sizes() -> dict[str, PartSizeNet]:
 def hidden_parts(
     fields: tuple[PartSdf, ...], shown: tuple[PartSdf, ...], canvas: Canvas, divided: Split
 ) -> tuple[PartSdf, ...]:
-    """Parts that the drawing hides, as the pose alone has them; those that cannot be there are left out.
+    """Parts that the drawing hides, inferred from the pose alone, without those that cannot be there.
 
-    They are cut off at the drawn outline, for what does not show may not stick out of it. Under cloth there is nothing
-    to be seen of them. What would float, without touching what is shown, is left out too.
+    They are cut off at the drawn outline, because hidden parts may not stick out of it. Parts under cloth are left out,
+    and so are parts that would float without touching what is shown.
 
-    fields : what the networks made; shown : the parts of the drawing
+    fields : fields made by the networks; shown : the parts of the drawing
     """
     under_cloth = divided.garment | (divided.labels >= PART["hair"])
     waiting = []
@@ -193,7 +193,7 @@ def hidden_parts(
         outline = canvas.sample(canvas.sdf, columns)
         grid: FloatArray = np.maximum(field.grid, (outline + canvas.pitch)[..., None]).astype(np.float32)
         there = (grid < 0).any(axis=2)
-        if not there.any() or canvas.sample(under_cloth.astype(np.float64), columns[there]).mean() > MOST_CLOTH:
+        if not there.any() or canvas.sample(under_cloth.astype(np.float64), columns[there]).mean() > MAX_CLOTH:
             continue
         waiting.append(PartSdf(field.part, grid, field.centre, field.edge, False))
     held: list[PartSdf] = []
@@ -210,4 +210,4 @@ def _touches(part: PartSdf, others: tuple[PartSdf, ...]) -> bool:
     """Whether some nodes of a part lie well inside another."""
     nodes = np.argwhere(part.grid < 0)
     points = part.origin + part.spacing * nodes.astype(np.float64)
-    return any((grid_distance(other, points) < -part.spacing).sum() > LEAST_CONTACT for other in others)
+    return any((grid_distance(other, points) < -part.spacing).sum() > MIN_CONTACT for other in others)

@@ -28,7 +28,7 @@ from fig2mesh.records import BoolArray, PartSdf, Pose3D
 from fig2mesh.skeleton import BODY_PARTS, PART
 
 OVERLAP = 0.025
-"""How far neighbouring parts of one layer reach into each other, FIGURE units."""
+"""Overlap of neighbouring parts of one layer, FIGURE units."""
 
 CUT_BLUR_PX = 2.0
 """Smoothing of the cuts between parts, pixels. It moves the cut of a part one pixel wide by 1.3 pixels: on a coarse
@@ -37,13 +37,13 @@ canvas parts overlap by more than that."""
 THIN = 0.75
 """Largest grid spacing relative to the half thickness of a part."""
 
-LEAST_NODES, MOST_NODES = 64, 192
-"""The paper's grids have 64 nodes an edge (§4.2); small parts have fingers and need them more than large ones."""
+MIN_NODES, MAX_NODES = 64, 192
+"""The paper's grids have 64 nodes per edge (§4.2); small parts have fingers and need them more than large ones."""
 
 
 @dataclass(frozen=True)
 class Outline:
-    """Everything the outline road knows: the part fields and, for the texture, which part each pixel shows.
+    """Result of the outline method: the part fields and, for the texture, the part that each pixel shows.
 
     fillets : (first, second, grid) between two of the parts, see `Body`
     """
@@ -69,9 +69,9 @@ def outline_parts(
     Parameters
     ----------
     visible : (21,) bool, joints that the drawing shows
-    voxel : grid spacing aimed at, FIGURE units; large parts on coarser grids than 192³ asks for get a larger one
+    voxel : target grid spacing, FIGURE units; larger for large parts, whose grids are limited to 192³ nodes
     device : PyTorch device of the inflation and the field evaluation
-    infer : what makes the parts' fields that the layers take their cross-sections from; without it the outline is all
+    infer : function that makes the part fields from which layers take their cross-sections; None: rules alone
     """
     joints = pose.joints.astype(np.float64)
     divided = split(canvas, joints, visible)
@@ -84,7 +84,7 @@ def outline_parts(
         if (part := _part_field(canvas, surface, int(label), voxel, divided, device)) is not None
     ]
     if not found:
-        raise FigureError("silhouette", "too thin to be a solid", "pass a larger picture, or --quality fine")
+        raise FigureError("silhouette", "too thin to be a solid", "give a larger picture, or --quality fine")
     layer_of, parts = zip(*found, strict=True)
     hidden = hidden_parts(fields, parts, canvas, divided)
     return Outline((*parts, *hidden), divided, surfaces, canvas, make_fillets(canvas, parts, layer_of))
@@ -93,7 +93,7 @@ def outline_parts(
 def _part_field(
     canvas: Canvas, surface: LayerSurface, label: int, voxel: float, divided: Split, device: str
 ) -> PartSdf | None:
-    """One part of a layer on its own grid; None where nothing of it is left."""
+    """Field of one part of a layer on its own grid; None where nothing of it is left."""
     here = surface.labels == label
     if here.sum() < 4 or not (surface.u[here] > 0).any():
         return None
@@ -113,7 +113,7 @@ def _part_field(
     low = np.array([points[0, columns.min(), 0], points[rows.max(), 0, 1], (surface.z0[solid] - half).min()]) - pad
     high = np.array([points[0, columns.max(), 0], points[rows.min(), 0, 1], (surface.z0[solid] + half).max()]) + pad
     edge = float((high - low).max())
-    nodes = min(max(math.ceil(edge / voxel) + 1, LEAST_NODES), MOST_NODES)
+    nodes = min(max(math.ceil(edge / voxel) + 1, MIN_NODES), MAX_NODES)
     centre = (low + high) / 2.0
     with single_threaded():
         grid = _evaluate(canvas, surface, cut, centre, edge, nodes, device)
@@ -146,7 +146,7 @@ def _evaluate(
     images = [surface.u, surface.z0, slopes[0][1], -slopes[0][0], slopes[1][1], -slopes[1][0], cut]
     maps = [torch.from_numpy(canvas.sample(i, columns)).float().to(device)[..., None] for i in images]
     u, z0, u_x, u_y, z0_x, z0_y, cuts = maps
-    # Beyond the canvas u is only continued flat; distance to the canvas makes up for it.
+    # Beyond the canvas u is only extrapolated as a constant; the distance to the canvas makes up for it.
     height, width = canvas.sdf.shape
     where = canvas.pixels(columns)
     off = np.maximum(np.maximum(-where, where - (np.array([height, width]) - 1)), 0.0)

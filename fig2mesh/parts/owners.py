@@ -1,4 +1,4 @@
-"""Who owns each pixel of a silhouette: the core of the body, or a limb that lies before or behind it."""
+"""Assignment of each pixel of a silhouette to a layer: the core of the body, or a limb in front of or behind it."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.limbs import Limb
 from fig2mesh.skeleton import PART
 
-OWN_SHARE = 0.3
-"""A piece cut off from its layer is no mistake where this share of it lies along the layer's bones."""
+MIN_OWN_SHARE = 0.3
+"""A piece cut off from its layer stays with it if at least this share of the piece lies along the layer's bones."""
 
-LEAST_ISLAND = 0.01
-"""And where it has this share of the silhouette."""
+MIN_ISLAND = 0.01
+"""And if the piece has at least this share of the silhouette."""
 
 
 def owners(
@@ -23,9 +23,9 @@ def owners(
     layered: list[Limb],
     points: NDArray[np.float64],
 ) -> NDArray[np.int64]:
-    """(H, W) 0 core, 1.. layered limbs, -1 outside: the layer that the drawing shows at each pixel.
+    """(H, W) layer that the drawing shows at each pixel: 0 core, 1.. layered limbs, -1 outside.
 
-    core_excess : (H, W) signed distance to the bones of the core, less what they are thick
+    core_excess : (H, W) signed distance to the bones of the core, less their radius
     """
     inside = canvas.inside
     owner = np.full(inside.shape, -2)
@@ -54,7 +54,7 @@ def owners(
 
 
 def _give_leftovers(owner: NDArray[np.int64], costs: NDArray[np.float64]) -> None:
-    """Pixels nobody claimed (cloth, hair, bags) go, piece by piece, to the layer with which they share most border."""
+    """Assign unclaimed pixels (cloth, hair, bags), piece by piece, to the layer with which they share most border."""
     pieces, _ = ndimage.label(owner == -2)
     for index, window in enumerate(ndimage.find_objects(pieces), start=1):
         grown = tuple(slice(max(0, s.start - 1), s.stop + 1) for s in window)
@@ -72,7 +72,7 @@ def _give_leftovers(owner: NDArray[np.int64], costs: NDArray[np.float64]) -> Non
 
 
 def _rejoin_islands(owner: NDArray[np.int64], costs: NDArray[np.float64]) -> None:
-    """Pixels cut off from their own layer would float at its depth: they go to the layer around them."""
+    """Assign pixels cut off from their own layer to the layer around them: at their own layer's depth they float."""
     for index in range(len(costs)):
         pieces, count = ndimage.label(owner == index, np.ones((3, 3)))
         if count < 2:
@@ -80,7 +80,7 @@ def _rejoin_islands(owner: NDArray[np.int64], costs: NDArray[np.float64]) -> Non
         sizes = np.bincount(pieces.ravel())[1:]
         for piece in np.argsort(sizes)[:-1] + 1:
             here = pieces == piece
-            if (costs[index][here] < 0).mean() > OWN_SHARE and here.sum() > LEAST_ISLAND * (owner >= 0).sum():
+            if (costs[index][here] < 0).mean() > MIN_OWN_SHARE and here.sum() > MIN_ISLAND * (owner >= 0).sum():
                 # A head beyond the hand in front of its neck; what lies behind the hand joins it to the body.
                 continue
             border = ndimage.binary_dilation(here, np.ones((3, 3))) & ~here & (owner >= 0) & (owner != index)

@@ -1,4 +1,4 @@
-"""The pieces that a drawing consists of."""
+"""Connected pieces of a drawing."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from fig2mesh.image_frame import image_frame
 from fig2mesh.records import BoolArray, ByteArray, Figure
 
 SPECK = 3.0
-"""Pieces that are smaller than this many voxels in both directions cannot be told from dirt."""
+"""Least size of a piece in either direction, voxels; smaller ones cannot be distinguished from dirt."""
 
 MARGIN_PX = 4
 
 BAND_PX = 512
-"""Rows that are reduced at a time."""
+"""Rows reduced at a time."""
 
 
 class CleanFigure(NamedTuple):
-    """A figure without specks that no grid could hold, the number of pieces kept and of specks dropped."""
+    """Figure without specks too small for a grid, the number of pieces kept and of specks dropped."""
 
     figure: Figure
     pieces: int
     specks: int
 
 
-def clean(figure: Figure, voxel: float, most_px: int) -> CleanFigure:
-    """Drop specks, and cut the picture down to what the stages need.
+def clean(figure: Figure, voxel: float, max_px: int) -> CleanFigure:
+    """Drop specks, and crop and reduce the picture to what the stages need.
 
-    Pieces are 8-connected. The largest one is always kept. The picture is cut down to the silhouette and the joints,
-    so that nothing that follows depends on how much of a sheet lies around the figure, and reduced to about `most_px`
+    Pieces are 8-connected. The largest one is always kept. The picture is cropped to the silhouette and the joints,
+    so that nothing that follows depends on how much of a sheet lies around the figure, and reduced to about `max_px`
     pixels on its longer side: scans have far more than a texture can show.
     """
     pieces, _ = ndimage.label(figure.mask, np.ones((3, 3)))
@@ -43,7 +43,7 @@ def clean(figure: Figure, voxel: float, most_px: int) -> CleanFigure:
     kept = extent * image_frame(figure).units_per_px >= SPECK * voxel
     kept[np.argmax(areas)] = True
     mask = figure.mask if kept.all() else np.concatenate([[False], kept])[pieces]
-    del pieces  # four bytes a pixel of what may be a whole sheet
+    del pieces  # four bytes per pixel of what may be a whole sheet
 
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     low = np.minimum([columns[0], rows[0]], np.floor(figure.joints_px.min(axis=0))) - MARGIN_PX
@@ -51,7 +51,7 @@ def clean(figure: Figure, voxel: float, most_px: int) -> CleanFigure:
     x0, y0 = np.maximum(low, 0).astype(int)
     x1, y1 = np.minimum(high, figure.mask.shape[::-1]).astype(int)
     window = np.s_[y0:y1, x0:x1]
-    factor = max(y1 - y0, x1 - x0) // most_px
+    factor = max(y1 - y0, x1 - x0) // max_px
     joints = figure.joints_px - np.array([x0, y0], np.float32)
     labels = np.where(mask[window], figure.part_labels[window], 0)
     rgba, mask = figure.rgba[window], mask[window]
@@ -73,7 +73,7 @@ def clean(figure: Figure, voxel: float, most_px: int) -> CleanFigure:
 
 
 def _reduced(rgba: ByteArray, factor: int) -> ByteArray:
-    """`factor` pixels a side made one, in bands of rows: whole copies of a large scan take gigabytes."""
+    """Reduce by a whole factor, in bands of rows: whole copies of a large scan take gigabytes."""
     band = factor * max(1, BAND_PX // factor)
     rows = []
     for top in range(0, len(rgba), band):
@@ -84,13 +84,13 @@ def _reduced(rgba: ByteArray, factor: int) -> ByteArray:
 
 
 def _reduced_mask(mask: BoolArray, factor: int) -> BoolArray:
-    """By majority; where no pixel has one, the fullest ones."""
+    """Reduce a mask by majority; where no pixel has one, keep the fullest ones."""
     cover = np.asarray(Image.fromarray(np.where(mask, np.uint8(255), np.uint8(0))).reduce(factor))
     return np.asarray(cover >= min(128, int(cover.max())))
 
 
 def _reduced_labels(labels: ByteArray, factor: int) -> ByteArray:
-    """The label of the pixel in the middle."""
+    """Reduce labels to those of the pixels in the middle."""
     half, (height, width) = factor // 2, labels.shape
     padded = np.pad(labels, ((0, factor), (0, factor)), mode="edge")
     return padded[half::factor, half::factor][: -(-height // factor), : -(-width // factor)]

@@ -1,6 +1,6 @@
 """Held things and bags: layers of their own, inflated from their own outline, as deep as what they touch.
 
-They are known by the label `prop` alone; without it a silhouette does not tell a staff from an arm.
+They are identified by the label `prop` only; a silhouette alone does not distinguish a staff from an arm.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ from fig2mesh.parts.canvas import Canvas
 from fig2mesh.skeleton import PART
 
 GRIP = 0.09
-"""Pieces up to twice as far apart belong to one thing that goes on behind the hand between them, FIGURE units."""
+"""Half the largest distance between pieces of one thing that continues behind the hand between them, FIGURE units."""
 
-LEAST_PX = 12
-"""Smaller labels are slips of the brush."""
+MIN_PX = 12
+"""Least number of pixels of a thing; smaller labels are slips of the brush."""
 
 CROSSING = 0.05
-"""A thing with this share of it before the body lies in front of that, else beside what it touches."""
+"""A thing of which at least this share overlaps the body lies in front of it, else beside what it touches."""
 
 REST = 0.35
-"""A thing's middle keeps this share of its half thickness clear of the surface that it lies on, as limbs do."""
+"""Distance of a thing's middle from the surface that it lies on, share of its half thickness, as for limbs."""
 
 
 class Prop(NamedTuple):
-    """shown : (H, W) bool, where the drawing shows it; region : (H, W) bool, with what is behind a hand."""
+    """shown : (H, W) bool, visible pixels; region : (H, W) bool, including what is behind a hand."""
 
     shown: NDArray[np.bool_]
     region: NDArray[np.bool_]
 
 
 def find_props(canvas: Canvas) -> list[Prop]:
-    """The separate things among the pixels labelled as such."""
+    """Separate things among the pixels labelled `prop`."""
     given = canvas.inside & (canvas.labels == PART["prop"])
     if not given.any():
         return []
@@ -45,7 +45,7 @@ def find_props(canvas: Canvas) -> list[Prop]:
     result = []
     for piece in range(1, count + 1):
         shown = given & (pieces == piece)
-        if shown.sum() >= LEAST_PX:
+        if shown.sum() >= MIN_PX:
             around = ndimage.distance_transform_edt(pieces == piece) > reach
             result.append(Prop(shown, shown | (around & canvas.inside)))
     return result
@@ -56,10 +56,10 @@ def prop_depth(
     shown: NDArray[np.bool_],
     others: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]],
 ) -> float:
-    """FIGURE z of a thing's middle: things are stiff, and drawn parallel to the picture for all that one can see.
+    """FIGURE z of a thing's middle: things are assumed stiff and parallel to the picture.
 
-    half : (H, W) its half thickness, 0 where it is not
-    others : (front, back) FIGURE z of each other layer, (H, W), NaN where that is not
+    half : (H, W) its half thickness, 0 outside it
+    others : (front, back) FIGURE z of each other layer, (H, W), NaN outside it
     """
     front = np.fmax.reduce([front for front, _ in others])
     before = shown & np.isfinite(front)

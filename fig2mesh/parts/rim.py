@@ -12,12 +12,12 @@ from fig2mesh.parts.ends import Ends
 RIM_BLUR = 0.012
 """Smoothing of rims inside the silhouette, FIGURE units: the stairs of pixels would become teeth."""
 
-LEAST_SLOPE = 0.03
-"""Least increase of the squared half thickness from the rim inwards, FIGURE units: it makes what is drawn thinner than
+MIN_SLOPE = 0.03
+"""Least increase of the squared half thickness from the rim inwards, FIGURE units: it makes strokes thinner than
 half of it (strands, fringes) deeper than wide, so that grids and meshes hold it."""
 
 OVERLAP = 0.008
-"""How far layers that meet inside the silhouette reach into each other, FIGURE units."""
+"""Overlap of layers that meet inside the silhouette, FIGURE units."""
 
 
 def rim_distance(canvas: Canvas, region: NDArray[np.bool_], ends: Ends | None) -> NDArray[np.float64]:
@@ -34,7 +34,7 @@ def rim_distance(canvas: Canvas, region: NDArray[np.bool_], ends: Ends | None) -
         contour = np.pad(canvas.sdf, ((0, extra), (0, 0)), mode="edge")
         whole = raster_distance(inside) * canvas.pitch
         contour = np.where(np.abs(whole - contour) < 1.5 * canvas.pitch, contour, whole)
-    # Outside the silhouette the layer goes on, so that its smoothed rim does not touch the drawn one.
+    # Outside the silhouette the layer is continued, so that its smoothed rim does not touch the drawn one.
     _, nearest = ndimage.distance_transform_edt(~inside, return_indices=True)
     mine = region[tuple(nearest)]
     if mine.all():
@@ -54,7 +54,7 @@ def extended(distance: NDArray[np.float64], u: NDArray[np.float64], pitch: float
     """
     inside = distance < 0
     depth = np.where(inside, -distance, 0.0)
-    u = np.maximum(u, LEAST_SLOPE * depth)
+    u = np.maximum(u, MIN_SLOPE * depth)
     # Sums before quotients: nearest to the rim both are small.
     slope = ndimage.gaussian_filter(np.where(inside, u + depth**2, 0.0), 1.5)
     slope = slope / np.maximum(ndimage.gaussian_filter(depth, 1.5), 1e-3 * pitch)

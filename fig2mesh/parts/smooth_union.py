@@ -1,4 +1,4 @@
-"""Rounded joints: a body whose limbs melt together where they meet at an angle."""
+"""Smooth union of parts: fillets where limbs meet at an angle."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from fig2mesh.parts.fillets import NEIGHBOURS, within
 from fig2mesh.records import PartSdf
 
 RADIUS = 0.07
-"""Surfaces nearer to each other than this melt together, FIGURE units; less where a part is thinner."""
+"""Blend radius, FIGURE units: surfaces nearer to each other than this are blended; less where a part is thinner."""
 
 SHARED_COSINE = 0.7
-"""Parts whose gradients agree so well where both surfaces pass have one surface between them."""
+"""Threshold, cosine between gradients where both surfaces pass, above which two parts share one surface."""
 
 
 def smooth_union(body: Body, canvas: Canvas | None = None, radius: float = RADIUS) -> Body:
     """The body with fillets between all kinematic neighbours that cross each other.
 
-    canvas : whose drawn contour the fillets leave as it is; None: there is none
+    canvas : its drawn contour is not changed by fillets; None: there is none
 
     A hand on a hip keeps its crease. Parts that are cut from one surface are smooth already: where one ends in the
     other, a smooth minimum would only swell into a ring, so they get no fillet.
     """
-    # What has a fillet already are surfaces of their own, even where they run along each other.
+    # Pairs that have a fillet already have separate surfaces, even where they run along each other.
     filleted = {(first, second) for first, second, _ in body.fillets}
     thickness = [-float(part.grid.min()) for part in body.parts]
     made = []
@@ -46,7 +46,7 @@ def smooth_union(body: Body, canvas: Canvas | None = None, radius: float = RADIU
 
 
 def _cross(first: PartSdf, second: PartSdf) -> bool:
-    """Whether the surfaces of two parts meet at an angle, and are not one and the same."""
+    """Whether the surfaces of two parts meet at an angle, rather than being one surface."""
     near = np.argwhere(np.abs(first.grid) < first.spacing)
     points = first.origin.astype(np.float64) + near * first.spacing
     distance, _, slope = evaluate(pack([second], [(0, 0)]), points, with_gradients=True)

@@ -1,7 +1,7 @@
-"""Split a silhouette into layers and body parts by the skeleton.
+"""Segmentation of a silhouette into layers and body parts by the skeleton.
 
 The body is drawn as layers: a core (torso, head, and every limb that lies free of them) and the limbs that touch or
-cross something else. Each layer has a complete outline of its own: the torso goes on behind the arm in front of it,
+cross something else. Each layer has a complete outline of its own: the torso continues behind the arm in front of it,
 so that inflating it does not leave a trench where the arm is.
 """
 
@@ -30,9 +30,9 @@ from fig2mesh.records import BoolArray
 from fig2mesh.skeleton import JOINT, LIMBS, PART
 
 LAYERED_SHARE = 0.22
-"""Limbs with a larger share of their length against something else become layers of their own."""
+"""Threshold of the share of a limb's length against something else, above which it becomes a layer of its own."""
 
-HEAD_RADIUS_MIN = 0.05
+MIN_HEAD_RADIUS = 0.05
 
 LEGS_FIRST = sorted(LIMBS, key=lambda limb: limb.endswith("arm"))
 """Limbs in the order in which they are measured and claim their layers."""
@@ -58,7 +58,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Split:
-    """The layers of a figure, the core first, props last, and all its limbs (also those in the core).
+    """Layers of a figure, the core first, props last, and all its limbs (also those in the core).
 
     garment : (H, W) bool, pixels of the core that hang around the legs
     labels : (H, W) uint8, the part that the drawing shows at each pixel
@@ -101,7 +101,7 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
     layered = [limb for limb in bare if limb is not None and (limb.cloth or _contact(limb) > LAYERED_SHARE)]
     merged = [limb for limb in bare if limb is not None and not any(limb is x for x in layered)]
 
-    # Who owns each pixel of the silhouette: the core or one of the layered limbs.
+    # Owner of each pixel of the silhouette: the core or one of the layered limbs.
     core_excess = np.minimum(torso, head - head_radius(canvas, joints))
     core_excess = np.minimum(core_excess, thorax_distance(points, joints))
     for limb in merged:
@@ -138,7 +138,7 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         layers.append(Layer(limb.name, region, _as_given(computed, canvas, shown, limb.part), limb, shown))
         if limb.cloth:
             continue
-        # Behind a limb the core goes on: inside the torso, around the root joint, and where it is on both sides.
+        # Behind a limb the core continues: inside the torso, around the root joint, and where it is on both sides.
         root = np.linalg.norm(points - limb.points[0], axis=-1) < 1.3 * limb.radius[0]
         behind = closing(owner == 0, 1.5 * float(np.median(limb.radius)) / canvas.pitch)
         completed |= inside & region & ((torso < 0) | root | behind)
@@ -147,7 +147,7 @@ def split(canvas: Canvas, joints: NDArray[np.float64], visible: BoolArray) -> Sp
         layers.append(Layer(f"prop-{number}", prop.region, labels, None, prop.shown))
         wide = float(ndimage.distance_transform_edt(prop.region).max())
         completed |= prop.region & ((torso < 0) | closing(owner == 0, 1.5 * wide))
-    # Detached pieces that only a limb claimed but does not reach belong to the core, whatever is left of them.
+    # Detached pieces that only a limb claimed but does not reach belong to the core, with all that is left of them.
     completed |= inside & ~np.logical_or.reduce([completed, *(layer.region for layer in layers)])
     core_labels = _core_labels(points, torso, head, merged, garment)
     taken = np.concatenate([np.zeros(0, np.uint8), *(limb.part for limb in layered)])
@@ -189,14 +189,14 @@ def _contact(limb: Limb) -> float:
 def _as_given(
     computed: NDArray[np.uint8], canvas: Canvas, shown: NDArray[np.bool_], parts: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Part labels of a layer with those that the user gave where the drawing shows it: its own parts and extras."""
+    """Part labels of a layer, overridden by the user's where the drawing shows it: its own parts and extras."""
     given = canvas.labels
     wanted = shown & (computed > 0) & (np.isin(given, parts) | (given >= PART["hair"]))
     return np.where(wanted, given, computed).astype(np.uint8)
 
 
 def _with_chain(region: NDArray[np.bool_], excess: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """The pieces of a limb's region that hold some of its chain."""
+    """Pieces of a limb's region that contain some of its chain."""
     pieces, count = ndimage.label(region, np.ones((3, 3)))
     if count < 2:
         return region
@@ -223,6 +223,6 @@ def _core_labels(
 
 
 def head_radius(canvas: Canvas, joints: NDArray[np.float64]) -> float:
-    """Half width of the head: distance from its centre to the contour."""
+    """Half width of the head, FIGURE units: distance from its centre to the contour."""
     depth = -float(canvas.sample(canvas.sdf, joints[None, JOINT["head"], :2])[0])
-    return max(depth, HEAD_RADIUS_MIN)
+    return max(depth, MIN_HEAD_RADIUS)

@@ -11,13 +11,13 @@ from fig2mesh.records import Figure, Pose3D
 from fig2mesh.skeleton import JOINT, LIMB_JOINTS
 
 STRAIGHT = 0.8
-"""A figure stands on a leg that reaches down by this share of its length; a seated one does not."""
+"""Threshold, share of a leg's length by which it reaches down if the figure stands on it; a seated figure does not."""
 
-MOST_LEAN = 0.35
-"""Largest lean that is taken out, depth a height: 19 degrees."""
+MAX_LEAN = 0.35
+"""Largest lean that is removed, depth per height: 19 degrees."""
 
 WEIGHTS = {"head": 0.1, "thorax": 0.45, "pelvis": 0.45}
-"""Joint → share of the body's weight about it, roughly."""
+"""Joint → approximate share of the body's weight about it."""
 
 
 def lift_by_network(figure: Figure, frame: ImageFrame) -> Pose3D:
@@ -31,10 +31,10 @@ def lift_by_network(figure: Figure, frame: ImageFrame) -> Pose3D:
 
 
 def upright(joints: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(21, 3) joints of a standing figure without its lean to or from the viewer, FIGURE; of others as they are.
+    """(21, 3) joints of a standing figure without its lean towards or away from the viewer, FIGURE; others unchanged.
 
-    Seen from the front, a figure that leans by some degrees looks like one that does not: its network cannot know, but
-    nobody draws people who fall over. The weight is brought over the foot on which the figure stands, by a shear, so
+    From the front, a figure that leans by some degrees looks like one that does not, so the network cannot infer it,
+    but nobody draws people falling over. The weight is brought over the foot on which the figure stands, by a shear, so
     that x and y stay.
     """
     legs = [[joints[JOINT[f"{side}_{name}"]] for name in LIMB_JOINTS["leg"]] for side in "lr"]
@@ -46,7 +46,7 @@ def upright(joints: NDArray[np.float32]) -> NDArray[np.float32]:
     support = np.mean([(leg[2] + leg[3]) / 2 for leg in legs], axis=0) if both else (ankle + foot) / 2
     weight = np.sum([share * joints[JOINT[name]] for name, share in WEIGHTS.items()], axis=0)
     lean = float((weight[2] - support[2]) / max(float(weight[1] - support[1]), 1e-6))
-    lean = float(np.clip(lean, -MOST_LEAN, MOST_LEAN))
+    lean = float(np.clip(lean, -MAX_LEAN, MAX_LEAN))
     result = joints.copy()
     result[:, 2] -= lean * (joints[:, 1] - joints[JOINT["pelvis"], 1])
     return result

@@ -1,6 +1,6 @@
 """Depth of the joints without a network: foreshortened limbs lean the way limbs usually do.
 
-A limb drawn shorter than its twin leans towards the viewer or away; how far follows from its length, which way
+A limb drawn shorter than its twin leans towards the viewer or away; the amount follows from its length, the direction
 from anatomy: knees and forearms come forward, shins go back. Joints that the drawing hides go behind the body.
 """
 
@@ -15,12 +15,12 @@ from fig2mesh.records import Figure, Pose3D
 from fig2mesh.skeleton import JOINT, LIMB_BONES
 
 FORESHORTENED = 0.8
-"""Limbs shorter than this share of their twin lean; nearer lengths are the draughtsman's liberty."""
+"""Threshold, share of the twin's length, below which a limb leans; larger ratios are the draughtsman's liberty."""
 
 DAMPING = 0.7
-"""Share of the geometric depth that is used: drawn proportions are no measurements."""
+"""Share of the geometric depth that is used: drawn proportions are not exact."""
 
-MOST = 0.30
+MAX_DEPTH_STEP = 0.30
 """Largest depth difference along one bone, FIGURE units."""
 
 EYES_FORWARD = 0.08
@@ -47,7 +47,7 @@ def lift(figure: Figure, frame: ImageFrame) -> Pose3D:
             expected = _length(joints, JOINT[f"{twin}_{first}"], JOINT[f"{twin}_{second}"])
             lean = 0.0
             if own < FORESHORTENED * expected:
-                lean = min(DAMPING * math.sqrt(expected**2 - own**2), MOST) * direction
+                lean = min(DAMPING * math.sqrt(expected**2 - own**2), MAX_DEPTH_STEP) * direction
                 if not figure.visible[end] and first == "shoulder":
                     lean = -lean
             joints[end, 2] = joints[start, 2] + lean

@@ -23,7 +23,7 @@ _TILES_AT_ONCE = 4
 
 
 @dataclass(frozen=True)
-class Frame:
+class RenderedFrame:
     """H rows of W pixels, and counts of the work done for them.
 
     depth : (H, W) float32, distance along the ray, FIGURE units; infinite where nothing is hit
@@ -50,7 +50,7 @@ def render_frame(
     with_parts: bool = False,
     with_normals: bool = False,
     tolerance: float = 1e-4,
-) -> Frame:
+) -> RenderedFrame:
     """Trace a camera's picture, or its rows from the first to before the last.
 
     with_parts, with_normals : channels to compute; for each combination a separate kernel is compiled at first use
@@ -79,7 +79,7 @@ def render_frame(
     run_blocks(run, across * down, _TILES_AT_ONCE)
     rays, cells, computed = (int(sum(column)) for column in zip(*done, strict=True))
     counters.count("rays", rays)
-    return Frame(depth, parts, normals, rays, cells, computed)
+    return RenderedFrame(depth, parts, normals, rays, cells, computed)
 
 
 def _window(camera: Camera, rows: tuple[int, int]) -> Window:

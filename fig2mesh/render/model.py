@@ -14,7 +14,7 @@ from exporters.gltf.reader import Gltf, read_gltf
 from exporters.gltf.shape import MESHOPT
 from fig2mesh.measure.model import load_textured
 from georef.untrusted.damage import DamagedFile
-from georef.untrusted.image_file import check_head
+from georef.untrusted.image_file import check_header
 
 SUFFIXES = (".glb", ".gltf", ".ply", ".obj")
 """Suffixes of models; every other file is taken for a drawing."""
@@ -46,7 +46,7 @@ def _check_costs(gltf: Gltf) -> None:
     for index in range(len(gltf.items("accessors"))):
         gltf.accessor(index)
     for index in range(len(gltf.items("images"))):
-        check_head(gltf.image(index))
+        check_header(gltf.image(index))
 
 
 def _gltf_labels(gltf: Gltf) -> NDArray[np.uint8] | None:

@@ -21,7 +21,7 @@ class RenderRequest(FigureFiles, InferenceOptions):
         metavar="OUT",
         help="Output: .png for a still; .webp, .gif, .mp4 or a folder (of numbered PNGs) for a turntable.",
     )
-    mode: Mode = option(default="textured", help="Meaning of the colours.")
+    mode: Mode = option(default="textured", help="What the colours show.")
     effects: tuple[str, ...] = option(default=(), metavar="NAME,NAME…", help=f"Effects to add. {EFFECT_HELP}.")
     yaw: float = option(
         default=0.0,

@@ -17,7 +17,7 @@ from fig2mesh.texture.sources import Sources
 def bake(
     figure: Figure, textures: Sources, body: Body, unwrap: tuple[UvMesh, ...], *, texture_size: int
 ) -> tuple[Baked, ...]:
-    """Colour of each texel, and whether the drawing showed it."""
+    """Colour of each texel, and its observed mask."""
     frame = image_frame(figure)
     return tuple(
         bake_mesh(

@@ -1,4 +1,4 @@
-"""Stage `lift`: joints of the drawing into depth (paper §4.1)."""
+"""Stage `lift`: 3D joints from the drawn ones (paper §4.1)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ from fig2mesh.settings import Parts
 
 
 def lift(figure: Figure, *, parts: Parts) -> Pose3D:
-    """Joints in FIGURE, with the depth order that the figure asks for."""
+    """Joints in FIGURE, with the depth order given in the figure."""
     infer = lift_by_rule if parts == "outline" else lift_by_network
     return ordered(infer(figure, image_frame(figure)), figure.depth_order)

@@ -22,7 +22,7 @@ def model(
 ) -> tuple[TexturedMesh, ...]:
     """Meshes in ASSET, finest first.
 
-    unwrap, bake : None where no texture is asked for
+    unwrap, bake : None where no texture is requested
     height_m : height of the drawn figure, metres
     """
     if unwrap is None or bake is None:

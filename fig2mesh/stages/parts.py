@@ -21,7 +21,7 @@ def parts(
     precision: Precision,
     device: str,
 ) -> Outline:
-    """Signed distance fields of the parts; how deep they are is inferred by networks, or by rules."""
+    """Signed distance fields of the parts; their depth is inferred by networks, or by rules."""
     canvas = make_canvas(figure, image_frame(figure), canvas_px, voxel)
     infer = None if parts == "outline" else part_inference(lift, part_nodes, device, precision)
     return outline_parts(canvas, lift, figure.visible, voxel=voxel, device=device, infer=infer)

@@ -13,6 +13,6 @@ def solid(
 ) -> Solid:
     """A closed, oriented, manifold mesh, FIGURE, with as many components as the drawing has pieces.
 
-    cloud : None where the isosurface is asked for
+    cloud : None where the isosurface is requested
     """
     return make_solid(cloud if mesher == "ball-pivot" else None, body, pieces, spacing=spacing, closing=closing)

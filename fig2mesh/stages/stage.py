@@ -1,4 +1,4 @@
-"""What a stage is: one function, and the few facts about it that its signature does not tell."""
+"""Stage of the pipeline: one function, and the few facts that its signature does not hold."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fig2mesh.settings import Settings
 
 
 class Kept(Enum):
-    """Where the result of a stage is worth a file."""
+    """Storage policy of a stage's result."""
 
-    NEVER = "made again in no time"
+    NEVER = "fast to recompute"
     ON_REQUEST = "large: only in the folder of --save-stages"
-    ALWAYS = "small and slow to make"
+    ALWAYS = "small and slow to compute"
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ class Unless:
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage of the pipeline.
+    """Stage of the pipeline.
 
-    function : makes the result; see `fig2mesh.stages` for what its signature means
-    why : reason for the stage under given settings, shown by `fig2mesh plan` and in reports
+    function : makes the result; its signature is explained in `fig2mesh.stages`
+    why : description of the stage under given settings, shown by `fig2mesh plan` and in reports
     kept : whether stores keep the result
     unless : setting under which the stage is left out
     """
@@ -75,7 +75,7 @@ class Stage:
         return get_type_hints(self.function)["return"]
 
     def left_out(self, settings: Settings) -> str | None:
-        """Why the stage is not part of the pipeline under these settings; None where it is."""
+        """Reason why the stage is left out under these settings; None where it is not."""
         if self.unless is not None and getattr(settings, self.unless.setting) == self.unless.value:
             return self.unless.why
         return None

@@ -35,15 +35,15 @@ def _simplify(settings: Settings) -> str:
 
 def _textures(settings: Settings) -> str:
     inferred = settings.textures == "network"
-    return "colours of unseen sides, " + ("by two networks" if inferred else "those in front of them")
+    return "colours of hidden sides, " + ("by two networks" if inferred else "those in front of them")
 
 
 NO_POINTS: Final = Unless("mesher", "isosurface", "the isosurface needs no points")
-NO_TEXTURE: Final = Unless("textures", "none", "no texture is asked for")
+NO_TEXTURE: Final = Unless("textures", "none", "no texture is requested")
 
 STAGES: Final[tuple[Stage, ...]] = (
     Stage(lift, _lift),
-    Stage(parts, _parts, Kept.ON_REQUEST),  # 50 MB a figure
+    Stage(parts, _parts, Kept.ON_REQUEST),  # 50 MB per figure
     Stage(body, lambda settings: "the parts together", Kept.NEVER),
     Stage(cloud, lambda settings: "points for ball pivoting", Kept.ON_REQUEST, NO_POINTS),
     Stage(solid, lambda settings: f"the closed mesh, by {settings.mesher}"),
@@ -51,7 +51,7 @@ STAGES: Final[tuple[Stage, ...]] = (
     Stage(surface, lambda settings: "normals, parts and deviation of the simplified mesh"),
     Stage(unwrap, lambda settings: "texture coordinates", unless=NO_TEXTURE),
     Stage(textures, _textures, Kept.NEVER, NO_TEXTURE),
-    Stage(bake, lambda settings: f"a texture of {settings.texture_size} texels a side", unless=NO_TEXTURE),
+    Stage(bake, lambda settings: f"a texture of {settings.texture_size} texels per side", unless=NO_TEXTURE),
     Stage(model, lambda settings: "metres, on the ground", Kept.NEVER),
 )
 """Every stage after those whose results it needs."""

@@ -7,8 +7,8 @@ from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import Figure, FloatArray, Pose3D
 from fig2mesh.settings import Contours, Textures
+from fig2mesh.texture.majority import UnobservedPoints
 from fig2mesh.texture.sources import Sources, make_sources
-from fig2mesh.texture.votes import Unseen
 
 
 def textures(
@@ -22,13 +22,13 @@ def textures(
     texture_size: int,
     seed: int,
 ) -> Sources:
-    """Pictures from which the bake takes the colours of unseen texels."""
+    """Pictures from which the bake takes the colours of all texels."""
     frame = image_frame(figure)
 
-    def infer(picture: FloatArray) -> Unseen:
-        from fig2mesh.texture.unseen import shipped, unseen_sides
+    def infer(picture: FloatArray) -> UnobservedPoints:
+        from fig2mesh.texture.unobserved import shipped, unobserved_sides
 
-        return unseen_sides(body, lift, picture, frame, shipped())
+        return unobserved_sides(body, lift, picture, frame, shipped())
 
     inferred = infer if textures == "network" else None
     return make_sources(figure, frame, parts, texture_size, seed, inferred, contours=contours == "keep")

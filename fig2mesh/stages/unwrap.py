@@ -14,7 +14,7 @@ MIN_TEXELS = 128
 
 
 def unwrap(figure: Figure, simplify: tuple[Mesh, ...], *, texture_size: int) -> tuple[UvMesh, ...]:
-    """Texture coordinates: what the drawing shows as it is drawn, charts of the rest."""
+    """Texture coordinates: the visible part as in the drawing, the rest as charts."""
     frame = image_frame(figure)
     unwrapped = []
     for level, mesh in enumerate(simplify):
@@ -25,5 +25,5 @@ def unwrap(figure: Figure, simplify: tuple[Mesh, ...], *, texture_size: int) -> 
 
 
 def texels_of_level(texture_size: int, level: int) -> int:
-    """Texels a side of a level's texture: half as many with each level, but enough to have charts."""
+    """Texels per side of a level's texture: halved with each level, but enough for charts."""
     return max(texture_size >> level, min(texture_size, MIN_TEXELS))

@@ -1,1 +1,1 @@
-"""Colours for the seen and the unseen side of a figure."""
+"""Colours for the visible and the hidden sides of a figure."""

@@ -15,20 +15,20 @@ from fig2mesh.texture.pen import STROKE
 FACE_SHARE = 1.05
 """Half width of the face relative to the head's."""
 
-LEAST_HAIR = 0.04
-"""Share of the head that hair or hat must have to be carried on over its back."""
+MIN_HAIR = 0.04
+"""Least share of the head covered by hair or hat for it to continue over the back."""
 
 SHADE = 18.0
-"""Colours of a head nearer to each other than this (CIELAB units) are light and shade of one thing."""
+"""Colour tolerance, CIELAB units: nearer colours of a head are light and shade of one thing."""
 
 CHEEKS = (0.3, 0.7)
-"""Where temples and cheeks begin and end, shares of the height of the face."""
+"""Start and end of temples and cheeks, shares of the height of the face."""
 
 BRIM = 1.6
-"""Hats are so much wider than faces."""
+"""Width of hats relative to faces."""
 
 FILLED = 0.4
-"""Share of an area that must have its colour: mixed rims of lines dominate where nothing else does."""
+"""Least share of an area that has its colour: mixed rims of lines dominate where nothing else does."""
 
 HAIRLINE = 0.55
 """Height of the hairline above the eyes relative to the head's half width."""
@@ -37,7 +37,7 @@ HAIRLINE = 0.55
 def drawn_face(
     figure: Figure, frame: ImageFrame, outline: Outline, points: NDArray[np.float64]
 ) -> tuple[NDArray[np.bool_], float]:
-    """(h, w) bool: where the drawing shows a face from the front, and the head's half width, FIGURE units.
+    """(h, w) bool: face drawn from the front; and the head's half width, FIGURE units.
 
     Profiles and faceless heads have none to hide.
     """
@@ -77,7 +77,7 @@ def back_of_head(
     ----------
     kind : (h, w) colour of each pixel's area; head, face : (h, w) bool
     palette : (K, 3) 0-255; index : (h, w) palette colour of each pixel; weight : (K,) small for colours of strokes
-    line : width of a contour, pixels; radius : how far beside the face its hair is looked for, pixels
+    line : width of a contour, pixels; radius : search distance for hair beside the face, pixels
     """
     colours = _area_colours(palette, kind, index, head, weight, line)
     if not len(colours):
@@ -92,7 +92,7 @@ def back_of_head(
     few = np.where(known[kind], colours[kind], 0)
     skin = int(np.argmax(np.bincount(few[face & known[kind]], minlength=len(palette))))
     hair = around & (few != skin)
-    if hair.sum() < LEAST_HAIR * head.sum():
+    if hair.sum() < MIN_HAIR * head.sum():
         hair = around
     # Right beside cheeks and temples there is hair; above there may be a hat, below a scarf, further out a rucksack.
     rows = np.flatnonzero(face.any(axis=1))
@@ -101,12 +101,12 @@ def back_of_head(
     wide = 2 * int(radius) + 1
     beside = hair & ndimage.binary_dilation(cheeks, np.ones((1, wide)))
     over = hair & ndimage.binary_dilation(face, np.ones((wide, wide)))
-    if beside.sum() >= LEAST_HAIR / 4 * head.sum():
+    if beside.sum() >= MIN_HAIR / 4 * head.sum():
         hair = beside
     elif np.ptp(np.flatnonzero(hair.any(axis=0))) > BRIM * np.ptp(np.flatnonzero(face.any(axis=0))):
         # A hat with a brim and no hair: a bare neck, not a hood.
         return np.where(face, skin, np.where(head, areas, kind))
-    elif over.sum() >= LEAST_HAIR / 2 * head.sum():
+    elif over.sum() >= MIN_HAIR / 2 * head.sum():
         hair = over
     hue = int(np.argmax(np.bincount(few[hair], minlength=len(palette))))
     return np.where(face, hue, np.where(head, areas, kind))
@@ -120,7 +120,7 @@ def _area_colours(
     weight: NDArray[np.float64],
     line: float,
 ) -> NDArray[np.int_]:
-    """(K,) the colour that each palette colour counts as among those with areas, -1 for strokes and mixed rims.
+    """(K,) index of the colour with areas that each palette colour is merged into, -1 for strokes and mixed rims.
 
     Empty where no colour has an area.
     """
@@ -131,7 +131,7 @@ def _area_colours(
     result = np.full(len(palette), -1)
     for colour in np.argsort(-count, kind="stable"):
         area = own & (kind == colour)
-        if count[colour] < LEAST_HAIR * own.sum() or weight[colour] <= STROKE:
+        if count[colour] < MIN_HAIR * own.sum() or weight[colour] <= STROKE:
             continue
         if ndimage.distance_transform_edt(area).max() <= max(line, 1.0):
             continue

@@ -1,4 +1,4 @@
-"""Areas that a drawing covers with marks: dots, checks, stripes, hatching, folds. They go on where it does not show."""
+"""Detection of areas with patterns: dots, checks, stripes, hatching, folds. They continue on the sides not drawn."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 REACH: Final = 1.5
-"""A mark covers what is within this many windows of it."""
+"""Radius, windows, of the area covered by a mark."""
 
-COVERED: Final = 0.7
-"""Share of an area that must be covered by marks."""
+MIN_COVERED: Final = 0.7
+"""Least share of an area covered by marks."""
 
-LEAST_MARKS: Final = 6
-"""Fewer marks are details: buttons, a badge, a belt."""
+MIN_MARKS: Final = 6
+"""Least number of marks; fewer are details: buttons, a badge, a belt."""
 
 RIM: Final = 0.6
-"""Marks this near to the border of what is shown are its contour, windows."""
+"""Marks nearer than this to the border of what is shown are its contour, windows."""
 
-LEAST_PX: Final = 3
-"""Smaller marks are noise, pixels."""
+MIN_PX: Final = 3
+"""Least size of a mark, pixels; smaller ones are noise."""
 
 
 def patterned(
@@ -32,7 +32,7 @@ def patterned(
     Parameters
     ----------
     index : (h, w) palette colour of each pixel of the drawing; kind : (h, w) colour of the area that it lies in
-    own : (h, w) bool, where the drawing shows these areas; window : pixels over which an area's colour dominates
+    own : (h, w) bool, visible pixels of these areas; window : pixels, over which an area's colour dominates
     """
     inner = ndimage.distance_transform_edt(own) > max(RIM * window, 1.0)
     areas = _areas(kind, own)
@@ -41,7 +41,7 @@ def patterned(
         return np.zeros_like(own)
     size = np.bincount(marks.ravel())
     size[0] = 0
-    marks[size[marks] < LEAST_PX] = 0
+    marks[size[marks] < MIN_PX] = 0
     # A mark belongs to the area in which most of it lies; areas' own borders are not marks.
     near = ndimage.distance_transform_edt(marks == 0) <= REACH * window
     total = int(areas.max()) + 1
@@ -49,7 +49,7 @@ def patterned(
     covered = np.bincount(areas[inner & near], minlength=total)
     pairs = np.unique(np.stack([areas[marks > 0], marks[marks > 0]]), axis=1)
     number = np.bincount(pairs[0], minlength=total)
-    chosen = (covered >= COVERED * np.maximum(room, 1)) & (number >= LEAST_MARKS)
+    chosen = (covered >= MIN_COVERED * np.maximum(room, 1)) & (number >= MIN_MARKS)
     chosen[0] = False
     return np.asarray(inner & chosen[areas])
 

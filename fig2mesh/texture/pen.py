@@ -1,4 +1,4 @@
-"""The draughtsman's pen: whether areas are drawn with contours, how wide they are, and the same lines elsewhere."""
+"""Pen of a drawing: detection of contours and their width, and the same lines elsewhere."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 STROKE: Final = 0.2
-"""Palette colours of less weight only occur as strokes."""
+"""Threshold of a palette colour's weight, below which it occurs only as strokes."""
 
 DARK: Final = 0.3
-"""Relative luminance below which a colour may be ink."""
+"""Threshold of relative luminance, below which a colour may be ink."""
 
 DRAWN: Final = 0.5
-"""Share of a border along which there must be ink for it to count as drawn."""
+"""Least share of a border with ink along it for the border to count as drawn."""
 
 REACH: Final = 1.5
-"""Ink is looked for within this many line widths of a border."""
+"""Search distance for ink from a border, line widths."""
 
 ALIKE: Final = 60.0
-"""Colours nearer to each other than this (RGB 0-255) are shades of one thing, or the pen's own colour in a wash."""
+"""Colour tolerance, RGB 0-255: nearer colours are shades of one thing, or the pen's own colour in a wash."""
 
 BAND: Final = 1.8
-"""The line along the silhouette lies within this many widths of it."""
+"""Distance from the silhouette within which its line lies, line widths."""
 
 INKY: Final = 110.0
-"""Colours nearer to the pen's than this (RGB 0-255) are its line, soft edges included."""
+"""Colour tolerance, RGB 0-255, of the pen's line, soft edges included."""
 
-LEAST_BORDER: Final = 12
-"""Pixels; shorter borders tell nothing."""
+MIN_BORDER_PX: Final = 12
+"""Least length of a border, pixels; shorter ones are not evaluated."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Pen:
 def find_pen(
     palette: NDArray[np.float32], index: NDArray[np.int_], weight: NDArray[np.float64], own: NDArray[np.bool_]
 ) -> Pen | None:
-    """The pen of a drawing whose silhouette has a contour; None where it has none.
+    """Pen of a drawing whose silhouette has a contour; None where it has none.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def find_pen(
     rim = own & ~ndimage.binary_erosion(own)
     if near[rim].mean() < DRAWN:
         return None
-    most = inks[int(np.argmax([(index[strokes] == ink).sum() for ink in inks]))]
-    return Pen(palette[most], width, near)
+    commonest = inks[int(np.argmax([(index[strokes] == ink).sum() for ink in inks]))]
+    return Pen(palette[commonest], width, near)
 
 
 def without_contour(
     picture: NDArray[np.float32], own: NDArray[np.bool_], pen: Pen, width: float
 ) -> NDArray[np.float32]:
-    """A picture (H, W, 3) with the line along the silhouette in the colours further in.
+    """Replace the line along the silhouette of a picture (H, W, 3) by the colours further in.
 
     own : (H, W) bool, the silhouette; width : of the line in pixels of the picture
     """
@@ -81,7 +81,7 @@ def without_contour(
     # Where the line ends it is mixed with what is beside it.
     line = within & ndimage.binary_dilation(inky & within, iterations=max(1, round(width / 4)))
     away, source = ndimage.distance_transform_edt(line | ~own, return_indices=True)
-    # Clothes as dark as ink go on further in, and stay.
+    # Clothes as dark as ink continue further in, and are kept.
     line &= away <= 1.5 * BAND * width
     near = ndimage.distance_transform_edt(~line) <= BAND * width
     return np.where(((line | ~own) & near)[..., None], picture[tuple(source)], picture)
@@ -92,8 +92,8 @@ def reinked(
 ) -> NDArray[np.float32]:
     """(h, w, 3) plain areas with lines where they meet, for pairs of colours between which the drawing has lines.
 
-    palette : (K, 3) 0-255; kind : (h, w) which colour each pixel has
-    own : (h, w) bool, where the drawing shows these areas
+    palette : (K, 3) 0-255; kind : (h, w) palette colour of each pixel
+    own : (h, w) bool, visible pixels of these areas
     """
     picture = palette[kind]
     if pen is None:
@@ -109,7 +109,7 @@ def reinked(
         other = np.roll(kind, 1, axis)
         for pair in _pairs(kind, border & may[kind, other], axis):
             shown = pair & own
-            if shown.sum() >= LEAST_BORDER and pen.near[shown].mean() >= DRAWN:
+            if shown.sum() >= MIN_BORDER_PX and pen.near[shown].mean() >= DRAWN:
                 lines |= pair
     if not lines.any():
         return picture
@@ -118,7 +118,7 @@ def reinked(
 
 
 def _pairs(kind: NDArray[np.int_], border: NDArray[np.bool_], axis: int) -> list[NDArray[np.bool_]]:
-    """The border's pixels by the pair of colours that meet there."""
+    """Pixels of the border by the pair of colours that meet there."""
     before = np.roll(kind, 1, axis)
     count = int(kind.max()) + 1
     code = np.minimum(kind, before) * count + np.maximum(kind, before)

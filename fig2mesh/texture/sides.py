@@ -1,4 +1,4 @@
-"""A body from its four sides: front, left, back, right (paper §4.3, appendix B)."""
+"""Views of a body from four sides: front, left, back, right (paper §4.3, appendix B)."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ FILLED: Final = 0.9
 
 
 @dataclass(frozen=True)
-class Sides:
-    """What is seen from each side.
+class SideViews:
+    """Labels, depths and points of a body in views from its four sides.
 
-    labels : (4, H, W) uint8, body parts (extras as the part that they cover), 0 where nothing is seen
+    labels : (4, H, W) uint8, body parts (extras as the part that they cover), 0 where nothing is visible
     shown : (4, H, W) uint8, parts as they are, extras too
-    depth : (4, H, W) float32, VIEW z, FIGURE units, -inf where nothing is seen
-    points : (4, H, W, 3) float32, FIGURE; zeros where nothing is seen
+    depth : (4, H, W) float32, VIEW z, FIGURE units, -inf where nothing is visible
+    points : (4, H, W, 3) float32, FIGURE; zeros where nothing is visible
     centre : (2,) FIGURE x, y in the middle of the front picture
-    pitch : FIGURE units of a pixel of the front picture
+    pitch : FIGURE units per pixel of the front picture
     """
 
     labels: NDArray[np.uint8]
@@ -40,7 +40,7 @@ class Sides:
 
     @property
     def half(self) -> float:
-        """Half the edge of the front picture, FIGURE units: what 1 is among places."""
+        """Half the edge of the front picture, FIGURE units; the unit of `places`."""
         return float(self.pitch * self.labels.shape[1] / 2)
 
     def places(self) -> NDArray[np.float32]:
@@ -48,8 +48,8 @@ class Sides:
         return np.asarray((self.points[..., :2] - np.array(self.centre)) / self.half * [1.0, -1.0], np.float32)
 
 
-def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
-    """The four sides of a body, each as large as fits."""
+def trace_sides(body: Body, pose: Pose3D, size: int = SIZE) -> SideViews:
+    """Trace the four sides of a body, each as large as fits."""
     bounds = body.bounds().astype(np.float64)
     centre = bounds.mean(axis=0)
     labels, shown, depths, points, pitches = [], [], [], [], []
@@ -62,21 +62,21 @@ def look_around(body: Body, pose: Pose3D, size: int = SIZE) -> Sides:
             orthographic(yaw, size=(size, size), height=pitch * size, centre=centre, distance=float(extent[2])),
             with_normals=False,
         )
-        seen = images(hits, (size, size)).part_index
-        there = seen >= 0
+        part_index = images(hits, (size, size)).part_index
+        there = part_index >= 0
         place = np.where(there[..., None], hits.points.reshape(size, size, 3), np.float32(0))
-        part = np.where(there, body.labels[np.maximum(seen, 0)], np.uint8(0))
+        part = np.where(there, body.labels[np.maximum(part_index, 0)], np.uint8(0))
         labels.append(body_labels(part, place, pose))
         shown.append(part)
         depths.append(np.where(there, place @ turn[2].astype(np.float32), -np.inf).astype(np.float32))
         points.append(place)
         pitches.append(pitch)
     middle = (float(centre[0]), float(centre[1]))
-    return Sides(np.stack(labels), np.stack(shown), np.stack(depths), np.stack(points), middle, pitches[0])
+    return SideViews(np.stack(labels), np.stack(shown), np.stack(depths), np.stack(points), middle, pitches[0])
 
 
 def body_labels(labels: NDArray[np.uint8], points: NDArray[np.floating], pose: Pose3D) -> NDArray[np.uint8]:
-    """Labels with body parts in place of extras: networks learned bodies in clothes, not clothes.
+    """Replace the labels of extras by body parts: networks were trained on bodies in clothes, not on clothes.
 
     Hair and hats count as head; cloth as what it covers: the trunk, or below the hips the leg of its side; what is
     carried as nothing.
@@ -87,7 +87,7 @@ def body_labels(labels: NDArray[np.uint8], points: NDArray[np.floating], pose: P
     if cloth.any():
         hips = joints[[JOINT["l_hip"], JOINT["r_hip"]], :2].mean(axis=0)
         knees = joints[[JOINT["l_knee"], JOINT["r_knee"]], 1].mean()
-        # The figure's left is to the right as the viewer sees it, unless its back is drawn.
+        # The figure's left is to the right from the viewer's side, unless its back is drawn.
         mirrored = joints[JOINT["l_hip"], 0] < joints[JOINT["r_hip"], 0]
         left = (points[..., 0] > hips[0]) != mirrored
         leg = [np.where(left, PART[f"l_{kind}_leg"], PART[f"r_{kind}_leg"]) for kind in ("upper", "lower")]

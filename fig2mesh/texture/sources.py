@@ -1,4 +1,4 @@
-"""Pictures from which the surface takes its colours: the drawing itself, and a plain version of it for unseen sides.
+"""Colour sources of the surface: the drawing itself, and a plain version of it for sides that are not observed.
 
 The plain version keeps the drawing's flat colours and loses what a draughtsman would not repeat at the back: contours,
 buttons, eyes. It is a mode filter over a small palette: at every pixel the colour that dominates its neighbourhood.
@@ -20,18 +20,18 @@ from fig2mesh.parts.outline import Outline
 from fig2mesh.records import Figure
 from fig2mesh.skeleton import PART
 from fig2mesh.texture.heads import back_of_head, drawn_face
+from fig2mesh.texture.majority import UnobservedPoints, recoloured_by_majority
 from fig2mesh.texture.patterns import patterned
 from fig2mesh.texture.pen import DARK, Pen, find_pen, reinked, without_contour
-from fig2mesh.texture.votes import Unseen, voted
 
 CUT_OUT = 64
-"""Mean alpha beside a figure below which it was cut out of its picture."""
+"""Threshold of mean alpha beside a figure, below which it counts as cut out of its picture."""
 
 UNLIKE = 16.0
-"""How much more that must be, RGB 0-255."""
+"""Least excess of a rim pixel's difference from the paper, RGB 0-255."""
 
-LEAST_ALPHA = 64
-"""Alpha above which a pixel's colour is known well enough."""
+MIN_ALPHA = 64
+"""Least alpha of a pixel with a known colour."""
 
 COLOURS = 16
 """Palette size; flat drawings have fewer, shaded ones lose little."""
@@ -40,17 +40,17 @@ WINDOW = 0.022
 """Radius of the mode filter, FIGURE units: wider than a contour, narrower than a limb."""
 
 LINE_WIDTH = 0.014
-"""Colours that only occur in strokes thinner than about twice this are ink, FIGURE units."""
+"""Half the largest width of strokes of ink, FIGURE units: colours that only occur in thinner ones are ink."""
 
 PLAIN_SHARE = 0.625
-"""Longest side of the plain pictures relative to the texture's: what the texture could show of them."""
+"""Longest side of the plain pictures relative to the texture's: the texture shows no more of them."""
 
 GRAZING = 0.0
-"""A contour at the rim is drawn out along the side: at -0.1 fronts come nearer to the drawing by 0.3 dB or so, and
-sides have broader stripes; at 0.15 fronts lose 2 to 9 dB."""
+"""Threshold of the normal's z: a contour at the rim is drawn out along the side. At -0.1 fronts come nearer to the
+drawing by 0.3 dB or so, and sides have broader stripes; at 0.15 fronts lose 2 to 9 dB."""
 
 GRAZING_BARE = 0.3
-"""The same without the contour: nothing is lost, and what is left of its soft edge is not drawn out."""
+"""The same threshold without the contour: nothing is lost, and what is left of its soft edge is not drawn out."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +58,11 @@ class Sources:
     """Colour pictures in IMAGE pixels of the figure.
 
     seen : (H, W, 3) float32 sRGB 0-255; the drawing, its colours continued beyond the silhouette
-    plain : part label → (h, w, 3) float32, the colours that part has on its unseen sides
+    plain : part label → (h, w, 3) float32, colours of that part on its sides that are not observed
     plain_scale : IMAGE pixels → pixels of the plain pictures
     pen : of the drawing, its width in FIGURE units; None where it has no contours
-    grazing : least z of the smooth normal of a point that the drawing colours. The smooth normal decides and not the
-        triangle's, so that the border between seen and unseen runs evenly across triangles
+    grazing : least z of the smooth normal of a point coloured by the drawing. The smooth normal is compared, not the
+        triangle's, so that the border between observed and inferred runs evenly across triangles
     """
 
     seen: NDArray[np.float32]
@@ -78,12 +78,12 @@ def make_sources(
     outline: Outline,
     texture_size: int,
     seed: int,
-    ask: Callable[[NDArray[np.float32]], Unseen] | None = None,
+    infer: Callable[[NDArray[np.float32]], UnobservedPoints] | None = None,
     contours: bool = True,
 ) -> Sources:
-    """The drawing and its plain version for each part of `outline`.
+    """Make the drawing and its plain version for each part of `outline`.
 
-    ask : what networks tell of the unseen sides, given the picture with its colours continued
+    infer : function that makes the networks' points of the other sides from the picture with its colours continued
     contours : keep the line along the silhouette
     """
     seen = continued(figure.rgba, figure.mask)
@@ -105,7 +105,7 @@ def make_sources(
     ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)
     pen = find_pen(palette, index, ink, labels > 0)
 
-    unseen = None if ask is None else ask(seen)
+    unobserved = None if infer is None else infer(seen)
     face, radius = drawn_face(figure, frame, outline, points)
     plain: dict[int, NDArray[np.float32]] = {}
     for surface in outline.layers:
@@ -115,18 +115,18 @@ def make_sources(
             own = labels > 0
         kind = _dominant(index, own, ink, WINDOW / pitch)
         if PART["head"] in parts:
-            # Networks tell worst where on a head they are: half of their errors are there.
+            # Networks are worst on heads: half of their errors are there.
             line, reach = LINE_WIDTH / pitch, 0.5 * radius / pitch
             areas = back_of_head(kind, labels == PART["head"], face, palette, index, ink, line, reach)
             plain[PART["head"]] = reinked(palette, areas, own, pen)
             parts.remove(PART["head"])
-        if parts and unseen is not None:
-            chosen = np.isin(unseen.labels, parts)
+        if parts and unobserved is not None:
+            chosen = np.isin(unobserved.labels, parts)
             pixels, named = (
                 np.floor(frame.image_from_figure(places[chosen].astype(np.float64))[:, ::-1] / factor).astype(int)
-                for places in (unseen.points, unseen.found)
+                for places in (unobserved.points, unobserved.found)
             )
-            kind = voted(kind, pixels, named)
+            kind = recoloured_by_majority(kind, pixels, named)
         if parts:
             drawn = patterned(index, kind, own, WINDOW / pitch)[..., None]
             plain |= dict.fromkeys(parts, np.where(drawn, small, reinked(palette, kind, own, pen)))
@@ -138,14 +138,14 @@ def make_sources(
 
 
 def continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """The picture with its inner colours carried outwards, so that no background is mixed in at the rim.
+    """Extrapolate the inner colours of a picture outwards, so that no background is mixed in at the rim.
 
-    Of scans the outermost pixel is mixed with paper, unless it is a contour no wider than that. Cut-out figures have
+    In scans the outermost pixel is mixed with paper, unless it is a contour no wider than that. Cut-out figures have
     their own colour up to the rim.
     """
     alpha = rgba[..., 3]
     if not mask.all() and alpha[~mask].mean() < CUT_OUT:
-        solid = mask & (alpha >= LEAST_ALPHA)
+        solid = mask & (alpha >= MIN_ALPHA)
     else:
         solid = ndimage.binary_erosion(mask, border_value=1) & (alpha > 250)
         solid |= mask & _unlike_paper(rgba, mask, solid)
@@ -156,7 +156,7 @@ def continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.fl
 
 
 def _unlike_paper(rgba: NDArray[np.uint8], mask: NDArray[np.bool_], solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(H, W) bool: pixels that differ more from the paper beside them than the figure further in does."""
+    """(H, W) bool: pixels that differ more from the paper beside them than the figure's inner pixels do."""
     paper = ~ndimage.binary_dilation(mask, iterations=2)
     if not paper.any() or not solid.any():
         return np.zeros_like(mask)
@@ -178,7 +178,7 @@ def _lookup(image: NDArray[np.uint8], where: NDArray[np.int_]) -> NDArray[np.uin
 def _palette(
     picture: NDArray[np.float32], own: NDArray[np.bool_], seed: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int_]]:
-    """(K, 3) colours of the figure and the (h, w) index of the nearest one at every pixel."""
+    """(K, 3) colours of the figure and the (h, w) index of the nearest one for every pixel."""
     pixels = picture[own]
     random = np.random.default_rng(seed)
     sample = pixels[random.permutation(len(pixels))[:20_000]].astype(np.float64)
@@ -224,7 +224,7 @@ def _dominant(
     weight: NDArray[np.float64],
     radius: float,
 ) -> NDArray[np.int_]:
-    """(h, w) index of the colour that dominates the neighbourhood among the pixels `own`; continued everywhere."""
+    """(h, w) mode filter: index of the dominant colour nearby, among the pixels `own`; continued outside."""
     best = np.zeros(index.shape)
     chosen = np.zeros(index.shape, int)
     for i in range(len(weight)):

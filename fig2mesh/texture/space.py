@@ -1,4 +1,4 @@
-"""Body texture space: pictures of what cameras see, spread out by their texture coordinates (Grigorev et al. 2019)."""
+"""Body texture space: camera pictures resampled by their texture coordinates (Grigorev et al. 2019)."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 SIZE: Final = 128
-"""Texels of an edge: four pictures of 256 x 256 pixels cover nearly all that a body has of that many."""
+"""Texels per edge: four pictures of 256 x 256 pixels cover nearly all texels of a body at that size."""
 
 INNER_PX: Final = 5.0
-"""Pixels this far inside of a side's silhouette count in full: at its rim there is the contour, seen at a slant."""
+"""Distance inside a side's silhouette from which pixels have full weight: at the rim is the contour, at a slant."""
 
 
-def inwards(seen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """(..., H, W) how far inside of its silhouette each pixel of pictures is, pixels; 0 outside."""
-    flat = seen.reshape(-1, *seen.shape[-2:])
+def inwards(inside: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(..., H, W) distance of each pixel of pictures to the outside of its silhouette, pixels; 0 outside."""
+    flat = inside.reshape(-1, *inside.shape[-2:])
     away = [ndimage.distance_transform_edt(np.pad(side, 1))[1:-1, 1:-1] for side in flat]
-    return np.stack(away).reshape(seen.shape)
+    return np.stack(away).reshape(inside.shape)
 
 
 def shown_alike(labels: NDArray[np.uint8], places: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """(4, H, W) whether the front shows the same part where each pixel's point lies behind it.
+    """(4, H, W) bool: the front shows the same part at the location of each pixel's point.
 
     labels : (4, H, W) parts, the front first; places : (4, H, W, 2) in the front picture, edges at -1 and 1
     """
@@ -33,14 +33,14 @@ def shown_alike(labels: NDArray[np.uint8], places: NDArray[np.floating]) -> NDAr
 
 
 def trust(inner: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Weights of pixels by how far inside they are."""
+    """Weights of pixels by their distance inside the silhouette."""
     return np.clip(inner / INNER_PX, 0.05, 1.0)
 
 
 def spread(
     uv: NDArray[np.floating], values: NDArray[np.floating], weights: NDArray[np.floating], size: int = SIZE
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Weighted means of values in the texels that they fall into.
+    """Splat values: weighted means in the texels that they fall into.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Control points in a IIIF Georeference annotation.
 
 https://iiif.io/api/extension/georef/: `resourceCoords` count pixels of the full resource from its upper left corner,
-as IMAGE does; places are GeoJSON points, WGS 84, longitude first. Older annotations say `pixelCoords`. `resourceCrs`,
-the projection of the sheet, is an addition of Allmaps'.
+as IMAGE does; places are GeoJSON points, WGS 84, longitude first. Older annotations use `pixelCoords`. `resourceCrs`,
+the projection of the sheet, is an extension by Allmaps.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from georef.untrusted.json_file import parse_json
 
 GEOREFERENCING = "georeferencing"
 
-MAX_HEAD = 2000
-"""Characters of an SVG selector in which the size of the resource is looked for."""
+MAX_SELECTOR_CHARACTERS = 2000
+"""Leading characters of an SVG selector that are searched for the size of the resource."""
 
 METHODS = {
     "helmert": "helmert",
@@ -43,19 +43,19 @@ def is_annotation(path: Path) -> bool:
 def read_annotation(path: Path) -> Controls:
     """Control points of the one georeference annotation in a file.
 
-    Raises PlacementError where there is none or more than one, and for features that are no control points.
+    Raises PlacementError where there is none or more than one, and for features that are not control points.
     """
     found = list(_annotations(_parsed(path)))
     if len(found) != 1:
         finding = f"{len(found) or 'no'} georeference annotations"
-        remedy = "keep the one of this map in a file of its own" if found else "give a IIIF Georeference annotation"
+        remedy = "save the one of this map in a separate file" if found else "give a IIIF Georeference annotation"
         raise PlacementError(path, finding, remedy)
     annotation = found[0]
     body = _body(annotation)
-    assert body is not None  # _annotations has looked
+    assert body is not None  # checked by _annotations
     features = body.get("features")
     if not isinstance(features, list):
-        raise PlacementError(path, "no features in its body", "give a IIIF Georeference annotation")
+        raise PlacementError(path, "no features in the body", "give a IIIF Georeference annotation")
     if len(features) > MAX_POINTS:
         raise PlacementError(path, f"{len(features)} control points", f"give at most {MAX_POINTS}")
     rows = [_row(feature, number, path) for number, feature in enumerate(features, start=1)]
@@ -108,7 +108,11 @@ def _row(feature: Any, number: int, path: Path) -> tuple[float, ...]:
     assert pixel is not None  # checked
     assert place is not None
     if not (abs(place[1]) <= 90 and abs(place[0]) <= 540):
-        raise PlacementError(path, f"feature {number} is at {place[:2]}", "give longitude first, then latitude")
+        raise PlacementError(
+            path,
+            f"feature {number} is at {place[:2]}, which is not a longitude and latitude",
+            "give longitude first, then latitude",
+        )
     return (pixel[0], pixel[1], place[0], place[1])
 
 
@@ -123,12 +127,12 @@ def _method(body: dict[str, Any]) -> str | None:
         return f"poly{int(order)}"
     if name.lower() in METHODS:
         return METHODS[name.lower()]
-    # Clients may choose another one than the preferred; the caller says that this one was not understood.
+    # Clients may choose another method than the preferred one; the caller warns that this one is unknown.
     return f"{name[:40]} of order {order!r}" if name.lower() == "polynomial" else name[:40] or None
 
 
 def _size(target: Any) -> tuple[float, float] | None:
-    """Width and height of the resource that pixels are counted on, wherever the target says it."""
+    """Width and height of the resource in whose pixels points are given, from the target."""
     if not isinstance(target, dict):
         return None
     for holder in (target.get("source"), target):
@@ -137,8 +141,8 @@ def _size(target: Any) -> tuple[float, float] | None:
             if len(sides) == 2:
                 return float(sides[0]), float(sides[1])
     selector = target.get("selector")
-    # Of a drawing only its head is looked at: XML is not parsed, and a search through all of it would not end.
-    drawing = str(selector.get("value"))[:MAX_HEAD] if isinstance(selector, dict) else ""
+    # Only the beginning of a drawing is searched: XML is not parsed, and a search through all of it could be slow.
+    drawing = str(selector.get("value"))[:MAX_SELECTOR_CHARACTERS] if isinstance(selector, dict) else ""
     found = [re.search(rf'<svg[^>]*\b{name}="(\d+(?:\.\d+)?)"', drawing) for name in ("width", "height")]
     numbers = [float(match[1]) for match in found if match is not None]
     return (numbers[0], numbers[1]) if len(numbers) == 2 and min(numbers) > 0 else None

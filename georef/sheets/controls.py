@@ -1,4 +1,4 @@
-"""What the files of a sheet say of its place: control points, or the map itself."""
+"""Georeferences of sheets: control points, or an affine map."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from georef.untrusted.json_file import read_bytes
 FloatArray = NDArray[np.float64]
 
 MAX_POINTS = 10_000
-"""More control points than anybody has set by hand; what has more is no list of control points."""
+"""Limit of control points: more than anybody sets by hand, so a longer file is not a list of control points."""
 
 MAX_BYTES = 8 << 20
-"""Largest text file that is read: 10,000 lines with all that programs write into them."""
+"""Largest text file that is read: 10,000 lines with everything that programs write into them."""
 
 
 @dataclass(frozen=True)
 class Controls:
-    """Points whose place is known both on the picture and on the map.
+    """Control points: points with known coordinates both on the picture and on the map.
 
     pixels : (N, 2) float64, IMAGE
     coordinates : (N, 2) float64, of `crs`, first coordinate the easterly one
-    crs : reference system of the coordinates, as any text that pyproj understands; None: the file does not say
-    method : transformation that the file asks for; None: it does not say
-    plane : reference system in which the file wants the transformation fitted; None: it does not say
-    size : width and height of the picture that the pixels were counted on; None: the file does not say
-    left_out : control points that the file has switched off
+    crs : reference system of the coordinates, as any text that pyproj understands; None: not given
+    method : transformation that the file requests; None: not given
+    plane : reference system in which the transformation is to be fitted; None: not given
+    size : width and height of the picture on which the points were set; None: not given
+    disabled : number of control points disabled in the file
     """
 
     pixels: FloatArray
@@ -41,12 +41,12 @@ class Controls:
     method: str | None = None
     plane: str | None = None
     size: tuple[float, float] | None = None
-    left_out: int = 0
+    disabled: int = 0
 
 
 @dataclass(frozen=True)
 class Affine:
-    """A map given outright.
+    """Affine map from pixels to coordinates.
 
     matrix : (2, 3) float64; coordinates are matrix @ (x, y, 1) of IMAGE
     crs : as in `Controls`
@@ -57,7 +57,7 @@ class Affine:
 
 
 def make_controls(source: Path, rows: Any, **more: Any) -> Controls:
-    """Control points from (N, 4) numbers: pixel x, y (IMAGE) and coordinates; identical rows count once.
+    """Control points from (N, 4) numbers: pixel x, y (IMAGE) and coordinates; duplicate rows are removed.
 
     Raises PlacementError for numbers that are not finite, too many points or none.
     """
@@ -65,7 +65,7 @@ def make_controls(source: Path, rows: Any, **more: Any) -> Controls:
     if len(table) > MAX_POINTS:
         raise PlacementError(source, f"{len(table)} control points", f"give at most {MAX_POINTS}")
     if not len(table):
-        raise PlacementError(source, "no control points", "give a file with at least two that are switched on")
+        raise PlacementError(source, "no control points", "give a file with at least two enabled control points")
     bad = ~np.isfinite(table).all(axis=1) | (np.abs(table) > 1e12).any(axis=1)
     if bad.any():
         finding = f"control point {int(np.argmax(bad)) + 1} is {table[bad][0].tolist()}"
@@ -75,21 +75,21 @@ def make_controls(source: Path, rows: Any, **more: Any) -> Controls:
 
 
 def on_picture(controls: Controls, size: tuple[int, int], source: Path) -> Controls:
-    """The control points on the picture at hand, which may be a smaller version of the one they were set on.
+    """Scale control points to the given picture, which may be a smaller version of the one they were set on.
 
-    Raises PlacementError where the picture has other proportions, or most of the points lie nowhere near it.
+    Raises PlacementError where the picture has another aspect ratio, or most of the points lie far outside it.
     """
     if controls.size is not None and controls.size != size:
-        # A derivative's sides are rounded to whole pixels, so they may differ from its proportions by one.
+        # The sides of a scaled picture are rounded to whole pixels, so its aspect ratio may be off by one pixel.
         factor = np.array(size) / np.array(controls.size)
         if abs(factor[0] / factor[1] - 1) > 1.0 / min(size) + 1.0 / min(controls.size):
-            finding = f"made for a picture of {_text(controls.size)} px, but the sheet has {_text(size)}"
-            raise PlacementError(source, finding, "give the picture it was made for, whole, at any resolution")
+            finding = f"made for a picture of {_text(controls.size)} px, but the sheet has {_text(size)} px"
+            raise PlacementError(source, finding, "give the whole picture it was made for, at any resolution")
         controls = replace(controls, pixels=controls.pixels * factor, size=(float(size[0]), float(size[1])))
     away = (controls.pixels < -np.array(size)) | (controls.pixels > 2 * np.array(size))
     if away.any(axis=1).mean() > 0.5:
-        finding = f"most control points lie nowhere near the sheet's {_text(size)} px"
-        raise PlacementError(source, finding, "give points counted in pixels of this picture")
+        finding = f"most control points lie far outside the sheet of {_text(size)} px"
+        raise PlacementError(source, finding, "give points in pixels of this picture")
     return controls
 
 
@@ -98,7 +98,7 @@ def _text(size: tuple[float, float]) -> str:
 
 
 def read_text(path: Path) -> str:
-    """The text of a small file in UTF-8 or UTF-16 with a byte order mark, in UTF-8, or else in Latin-1.
+    """Read a small text file: UTF-8 or UTF-16 with a byte order mark, plain UTF-8, or else Latin-1.
 
     Raises PlacementError for files that are missing, empty, too large or binary.
     """
@@ -111,7 +111,7 @@ def read_text(path: Path) -> str:
     except OSError as error:
         raise PlacementError(path, error.strerror or "cannot be read", "check the path") from None
     if not content.strip():
-        raise PlacementError(path, "it is empty", "give a file that is not")
+        raise PlacementError(path, "the file is empty", "give a georeference file")
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         text = content.decode("utf-16", errors="replace")
     else:
@@ -120,5 +120,5 @@ def read_text(path: Path) -> str:
         except UnicodeDecodeError:
             text = content.decode("latin-1")
     if "\0" in text:
-        raise PlacementError(path, "it is no text", "give a text file")
+        raise PlacementError(path, "not a text file", "give a text file")
     return text

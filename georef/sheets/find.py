@@ -1,4 +1,4 @@
-"""Which files belong to a sheet: the picture, and what lies beside it."""
+"""Files of a sheet: the picture, and the georeference files next to it."""
 
 from __future__ import annotations
 
@@ -10,20 +10,24 @@ import numpy as np
 from georef.errors import PlacementError
 from georef.sheets.annotation import is_annotation, read_annotation
 from georef.sheets.controls import Affine, Controls
-from georef.sheets.pictures import SUFFIXES, Picture, read_picture
+from georef.sheets.pictures import SUFFIXES, SheetPicture, read_picture
 from georef.sheets.points_file import read_points_file
 from georef.sheets.world_file import read_prj, read_world_file
 
 OPTION = "--map"
 
-SAME_PX = 0.01
-"""A world file that differs from a GeoTIFF's tags by less than this anywhere says the same."""
+SAME_MAP_TOLERANCE_PX = 0.01
+"""Tolerance below which a world file and a GeoTIFF's tags are considered equal, at the corners of the picture."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """picture : the sheet's picture, None where only its georeference is there; size : of the picture; file : what
-    the georeference was read from; georeference : with the reference system that any of the files names."""
+class SheetFiles:
+    """Files and georeference of a sheet.
+
+    picture : the sheet's picture, None where there is only a georeference; size : of the picture, px
+    file : the file that the georeference was read from
+    georeference : control points or an affine map; crs : reference system named in any of the files
+    """
 
     picture: Path | None
     size: tuple[int, int] | None
@@ -32,13 +36,13 @@ class Found:
     crs: str | None
 
 
-def find_georeference(sheet: Path) -> Found:
-    """The georeference of a sheet.
+def find_georeference(sheet: Path) -> SheetFiles:
+    """Find the georeference of a sheet.
 
-    sheet : a picture, whose georeference is in its tags or beside it, or the georeference itself: a .points file, an
-        annotation, a world file
+    sheet : a picture with its georeference in its tags or in a file next to it, or the georeference itself: a .points
+        file, an annotation, a world file
 
-    Raises PlacementError where there is none, or more than one that could be meant.
+    Raises PlacementError where there is no georeference, or more than one candidate.
     """
     if not sheet.is_file():
         raise PlacementError(f"{OPTION} {sheet}", "no such file", "give the sheet's picture or its georeference")
@@ -49,7 +53,7 @@ def find_georeference(sheet: Path) -> Found:
     facts = None if picture is None else read_picture(picture)
     georeference = _read(sheet, kind)
     crs = georeference.crs or _prj_beside(sheet, picture) or (facts.crs if facts is not None else None)
-    return Found(picture, None if facts is None else facts.size, sheet, georeference, crs)
+    return SheetFiles(picture, None if facts is None else facts.size, sheet, georeference, crs)
 
 
 def _kind(path: Path) -> str:
@@ -62,7 +66,7 @@ def _kind(path: Path) -> str:
         return "annotation"
     if suffix == ".wld" or (3 <= len(suffix) <= 6 and suffix.endswith("w")):
         return "world"
-    finding = f"its suffix is {path.suffix!r}"
+    finding = f"unknown suffix {path.suffix!r}"
     raise PlacementError(f"{OPTION} {path}", finding, "give a picture, .points, an annotation (.json) or a world file")
 
 
@@ -72,46 +76,46 @@ def _read(path: Path, kind: str) -> Affine | Controls:
     return read_points_file(path) if kind == "points" else read_annotation(path)
 
 
-def _of_picture(sheet: Path) -> Found:
+def _of_picture(sheet: Path) -> SheetFiles:
     facts = read_picture(sheet)
     world = _present(sheet, _world_suffixes(sheet.suffix))
     points = _present(sheet, (".points",))
-    notes = [path for path in _present(sheet, (".json", ".jsonld", ".geojson")) if is_annotation(path)]
-    candidates = [*world, *points, *notes]
+    annotations = [path for path in _present(sheet, (".json", ".jsonld", ".geojson")) if is_annotation(path)]
+    candidates = [*world, *points, *annotations]
     if facts.georeference is not None:
-        # Programs write world files beside GeoTIFFs; one that says the same is no second opinion.
-        candidates = [path for path in candidates if path not in world or not _same(facts, read_world_file(path))]
+        # Programs write world files next to GeoTIFFs; one that equals the tags is not a second candidate.
+        candidates = [path for path in candidates if path not in world or not _same_map(facts, read_world_file(path))]
         if not candidates:
-            return Found(sheet, facts.size, sheet, facts.georeference, facts.crs or _prj_beside(sheet, sheet))
+            return SheetFiles(sheet, facts.size, sheet, facts.georeference, facts.crs or _prj_beside(sheet, sheet))
         candidates = [sheet, *candidates]
     if not candidates:
         tried = ", ".join(dict.fromkeys(sheet.stem + s for s in (*_world_suffixes(sheet.suffix), ".points", ".json")))
-        raise PlacementError(f"{OPTION} {sheet}", "no georeference in it or beside it", f"put one there: {tried}")
+        raise PlacementError(f"{OPTION} {sheet}", "no georeference in its tags or next to it", f"add one of {tried}")
     if len(candidates) > 1:
         shown = " and ".join("its tags" if path == sheet else path.name for path in candidates)
         raise PlacementError(
-            f"{OPTION} {sheet}", f"{shown} could be meant", "name the one to use instead of the picture"
+            f"{OPTION} {sheet}", f"ambiguous georeference: {shown}", "give the one to use instead of the picture"
         )
     file = candidates[0]
     georeference = _read(file, _kind(file))
     crs = georeference.crs or _prj_beside(file, sheet) or facts.crs
-    return Found(sheet, facts.size, file, georeference, crs)
+    return SheetFiles(sheet, facts.size, file, georeference, crs)
 
 
 def _world_suffixes(suffix: str) -> tuple[str, ...]:
-    """.png → .pgw, .pngw, .wld"""
+    """Suffixes of world files, such as .png → .pgw, .pngw, .wld."""
     return (f".{suffix[1]}{suffix[-1]}w", f"{suffix}w", ".wld")
 
 
 def _present(path: Path, suffixes: tuple[str, ...]) -> list[Path]:
-    """Files named like `path` with one of the suffixes in place of its own or after it, in either case."""
+    """Files named like `path` with one of the suffixes in place of its own or appended, in lower or upper case."""
     names = dict.fromkeys(
         base + case for base in (path.stem, path.name) for s in suffixes for case in (s.lower(), s.upper())
     )
     found: list[Path] = []
     for name in names:
         candidate = path.with_name(name)
-        # File systems that do not tell cases apart find the same file twice.
+        # Case-insensitive file systems find the same file twice.
         if candidate != path and candidate.is_file() and not any(candidate.samefile(other) for other in found):
             found.append(candidate)
     return found
@@ -123,7 +127,7 @@ def _picture_beside(file: Path) -> Path | None:
     found = _present(file.with_name(file.stem + ".x"), SUFFIXES)
     if len(found) > 1:
         shown = " and ".join(path.name for path in found)
-        raise PlacementError(f"{OPTION} {file}", f"{shown} stand beside it", "keep one, the sheet, under this name")
+        raise PlacementError(f"{OPTION} {file}", f"ambiguous picture: {shown}", "keep only the sheet under this name")
     return found[0] if found else None
 
 
@@ -134,11 +138,11 @@ def _prj_beside(file: Path, picture: Path | None) -> str | None:
     return None
 
 
-def _same(facts: Picture, world: Affine) -> bool:
+def _same_map(facts: SheetPicture, world: Affine) -> bool:
     if not isinstance(facts.georeference, Affine):
         return False
     inner, other = facts.georeference.matrix, world.matrix
     width, height = facts.size
     corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]], np.float64)
     apart = corners @ (inner - other).T
-    return bool(np.abs(np.linalg.solve(inner[:, :2], apart.T)).max() < SAME_PX)
+    return bool(np.abs(np.linalg.solve(inner[:, :2], apart.T)).max() < SAME_MAP_TOLERANCE_PX)

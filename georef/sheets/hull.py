@@ -1,4 +1,4 @@
-"""Convex hulls of control points: where a transformation is known, and where it is only continued."""
+"""Convex hulls of control points: inside them a transformation interpolates, outside it extrapolates."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
 
 
 def nearest_in(hull: FloatArray, point: FloatArray) -> FloatArray:
-    """(2,) the point of a convex hull nearest to `point`: itself where it is inside."""
+    """(2,) the point of a convex hull nearest to `point`, which is `point` itself if it is inside."""
     ends = np.roll(hull, -1, axis=0)
     edges, offsets = ends - hull, point - hull
     if len(hull) > 2 and (edges[:, 0] * offsets[:, 1] - edges[:, 1] * offsets[:, 0] >= 0).all():

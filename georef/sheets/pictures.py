@@ -1,4 +1,4 @@
-"""What a picture file says without being decoded: its size, and the GeoTIFF tags of a TIFF.
+"""Headers of picture files, read without decoding: size, and the GeoTIFF tags of a TIFF.
 
 https://docs.ogc.org/is/19-008r4/19-008r4.html
 """
@@ -29,20 +29,23 @@ ESRI = "ESRI PE String ="
 
 
 @dataclass(frozen=True)
-class Picture:
-    """size : width and height, px; georeference : what its tags say, None where they say nothing; crs : as in
-    `Controls`, also where tags name only the reference system."""
+class SheetPicture:
+    """Header of a sheet's picture.
+
+    size : width and height, px; georeference : from its tags, None without them
+    crs : as in `Controls`, also where the tags give only the reference system
+    """
 
     size: tuple[int, int]
     georeference: Affine | Controls | None = None
     crs: str | None = None
 
 
-def read_picture(path: Path) -> Picture:
-    """Size and tags of a picture, of whatever size: nothing is decoded.
+def read_picture(path: Path) -> SheetPicture:
+    """Read size and tags of a picture of any size without decoding it.
 
-    Raises PlacementError for files that are no pictures, have broken tags, or are turned by their EXIF orientation,
-    since georeferences count pixels as stored.
+    Raises PlacementError for files that are not pictures, have broken tags, or are rotated by their EXIF orientation,
+    since georeferences refer to pixels as stored.
     """
     # The plugins of the formats above register themselves; `Image.init` would import thirty more.
     from PIL import Image, Jpeg2KImagePlugin, TiffImagePlugin, WebPImagePlugin  # noqa: F401
@@ -53,7 +56,7 @@ def read_picture(path: Path) -> Picture:
             warnings.simplefilter("ignore")
             head = file.read(16)
             file.seek(0)
-            # Not Image.open, which refuses large pictures before it is known whether anybody wants their pixels.
+            # Not Image.open, which rejects large pictures although only the header is needed.
             for factory, accept in Image.OPEN.values():
                 accepted = accept is None or accept(head)
                 if accepted and not isinstance(accepted, str):
@@ -63,24 +66,24 @@ def read_picture(path: Path) -> Picture:
                     except (SyntaxError, IndexError, TypeError, KeyError, EOFError, ValueError, OSError):
                         file.seek(0)
             else:
-                raise PlacementError(path, "no picture that can be read", "give a PNG, JPEG, TIFF or WebP as the sheet")
+                raise PlacementError(path, "not a readable picture", "give a PNG, JPEG, TIFF or WebP as the sheet")
             size = (int(image.size[0]), int(image.size[1]))
             tags = dict(getattr(image, "tag_v2", None) or {})
-            turned = orientation_of(image)
+            orientation = orientation_of(image)
     except PlacementError:
         raise
     except FileNotFoundError:
         raise PlacementError(path, "no such file", "check the path of the sheet") from None
     except Exception as error:
-        # Parsers of damaged headers raise whatever they stumble over.
+        # Parsers raise all kinds of exceptions for damaged headers.
         reason = getattr(error, "strerror", None) or type(error).__name__
         raise PlacementError(path, f"cannot be read ({reason})", "give an intact picture") from None
-    if turned not in (0, 1):
+    if orientation not in (0, 1):
         raise PlacementError(
-            path, "its EXIF orientation turns it", "save it upright; georeferences count stored pixels"
+            path, "rotated by its EXIF orientation", "save it upright; georeferences refer to stored pixels"
         )
     if not any(tag in tags for tag in (PIXEL_SCALE, TIEPOINTS, TRANSFORMATION, GEO_KEYS)):
-        return Picture(size)
+        return SheetPicture(size)
     try:
         return _georeferenced(path, size, tags)
     except DamagedFile:
@@ -88,9 +91,9 @@ def read_picture(path: Path) -> Picture:
 
 
 def orientation_of(image: Any) -> int:
-    """The Exif orientation in a picture's head, 1 where it has none: upright.
+    """EXIF orientation from a picture's header; 1, upright, where it has none.
 
-    image : as Pillow opened it. Its own `getexif` decodes a PNG to the end, where Exif data may also stand.
+    image : as Pillow opened it. Its own `getexif` decodes a whole PNG, since EXIF data may also be at the end.
     """
     if image.format != "PNG":
         return int(image.getexif().get(ORIENTATION, 1))
@@ -103,7 +106,7 @@ def orientation_of(image: Any) -> int:
     return int(exif.get(ORIENTATION, 1))
 
 
-def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> Picture:
+def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> SheetPicture:
     keys = _geo_keys(tags)
     crs = _crs(keys)
     # Where the raster type is "point", raster coordinates count from the centre of the first pixel.
@@ -125,30 +128,30 @@ def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> P
         matrix = np.array([[scale_x, 0.0, x - scale_x * column], [0.0, -scale_y, y + scale_y * row]])
     elif len(tiepoints) > 1:
         rows = np.concatenate([tiepoints[:, :2] + shift, tiepoints[:, 3:5]], axis=1)
-        return Picture(size, make_controls(path, rows, crs=crs), crs)
+        return SheetPicture(size, make_controls(path, rows, crs=crs), crs)
     else:
-        return Picture(size, None, crs)
+        return SheetPicture(size, None, crs)
     if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:, :2])) <= 1e-300:
-        raise PlacementError(path, "the map in its tags has no area", "give an intact GeoTIFF, or a world file")
+        raise PlacementError(path, "the map in its tags is singular", "give an intact GeoTIFF, or a world file")
     matrix[:, 2] -= matrix[:, :2] @ (shift, shift)
-    return Picture(size, Affine(matrix, crs), crs)
+    return SheetPicture(size, Affine(matrix, crs), crs)
 
 
 def _numbers(tags: dict[int, Any], tag: int, group: int = 1) -> list[float]:
-    """The numbers of a tag, none where it is missing. Raises DamagedFile for others than whole groups of numbers."""
+    """Numbers of a tag, none if it is missing. Raises DamagedFile for anything but complete groups of numbers."""
     values = tags.get(tag, ())
     if not isinstance(values, tuple) or not all(isinstance(value, Real) for value in values) or len(values) % group:
-        raise DamagedFile(f"tag {tag} holds other things than numbers")
+        raise DamagedFile(f"tag {tag} does not consist of numbers")
     return [float(value) for value in values]
 
 
 def _geo_keys(tags: dict[int, Any]) -> dict[int, Any]:
-    with decoding("a directory of keys", ValueError, OverflowError):  # not a number, or infinite
+    with decoding("bad key directory", ValueError, OverflowError):  # not a number, or infinite
         directory = [int(value) for value in _numbers(tags, GEO_KEYS)]
     keys: dict[int, Any] = {}
     for start in range(4, min(len(directory), 4 + 4 * (directory[3] if len(directory) > 3 else 0)), 4):
         if start + 4 > len(directory):
-            raise DamagedFile("a directory of keys that is cut off")
+            raise DamagedFile("truncated key directory")
         key, location, count, value = directory[start : start + 4]
         if location == 0:
             keys[key] = value
@@ -158,7 +161,7 @@ def _geo_keys(tags: dict[int, Any]) -> dict[int, Any]:
 
 
 def _crs(keys: dict[int, Any]) -> str | None:
-    """The reference system that the keys name by code, or as Esri's WKT in a citation."""
+    """Reference system named in the keys by code, or as Esri's WKT in a citation."""
     for key in (PROJECTED_CRS, *((GEODETIC_CRS,) if keys.get(MODEL_TYPE) == GEOGRAPHIC else ())):
         if keys.get(key) not in (None, 0, USER_DEFINED):
             return f"EPSG:{keys[key]}"

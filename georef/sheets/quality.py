@@ -1,4 +1,4 @@
-"""How well a transformation agrees with its control points, in metres on the ground."""
+"""Quality of a fitted transformation: residuals of its control points, in metres on the ground."""
 
 from __future__ import annotations
 
@@ -15,45 +15,45 @@ from georef.sheets.reference import Plane
 
 
 @dataclass(frozen=True)
-class Quality:
-    """How well a transformation agrees with its control points.
+class FitQuality:
+    """Agreement of a transformation with its control points.
 
-    residuals_m : of each control point, on the ground, metres
+    residuals_m : residual of each control point, on the ground, metres
     rmse_m : root mean square of the residuals
-    degrees_of_freedom : coordinates that the points give more than the transformation needs; 0: it goes through
-        every point, and residuals say nothing
+    degrees_of_freedom : number of coordinates minus number of parameters; 0: the transformation interpolates every
+        point, and residuals are meaningless
     sigma_m : standard error of one coordinate, from the residuals and the degrees of freedom; None without any
-    left_out_m : what each control point is missed by, on the ground, when it is left out; only of splines
+    leave_one_out_m : leave-one-out residual of each control point, on the ground, metres; only of splines
     """
 
     residuals_m: tuple[float, ...]
     rmse_m: float
     degrees_of_freedom: int
     sigma_m: float | None
-    left_out_m: tuple[float, ...] = ()
+    leave_one_out_m: tuple[float, ...] = ()
 
     @property
-    def left_out_rmse_m(self) -> float | None:
-        """Root mean square of `left_out_m`."""
-        return _rms(np.array(self.left_out_m)) if self.left_out_m else None
+    def leave_one_out_rmse_m(self) -> float | None:
+        """Root mean square of `leave_one_out_m`."""
+        return _rms(np.array(self.leave_one_out_m)) if self.leave_one_out_m else None
 
 
-def quality_of(fitted: Fit, plane: Plane, pixels: FloatArray, coordinates: FloatArray) -> Quality:
-    """What is known of a fit from its control points.
+def fit_quality(fitted: Fit, plane: Plane, pixels: FloatArray, coordinates: FloatArray) -> FitQuality:
+    """Quality of a fit, from its control points.
 
-    plane : in which it was fitted
+    plane : the plane in which it was fitted
     pixels : (N, 2) IMAGE; coordinates : (N, 2) of the plane
     """
     given = plane.to_lonlat(coordinates)
     residuals = distances_m(plane.to_lonlat(fitted.apply(pixels)), given)
     free = max(2 * len(given) - fitted.parameters, 0)
     sigma = math.sqrt(float((residuals**2).sum()) / free) if free else None
-    missed: tuple[float, ...] = ()
-    if fitted.left_out is not None:
-        # A spline made of too few points may put the one left out off the earth.
+    leave_one_out: tuple[float, ...] = ()
+    if fitted.leave_one_out is not None:
+        # A spline of too few points may put the one left out off the earth.
         with suppress(PlacementError):
-            missed = tuple(distances_m(plane.to_lonlat(coordinates - fitted.left_out), given).tolist())
-    return Quality(tuple(residuals.tolist()), _rms(residuals), free, sigma, missed)
+            leave_one_out = tuple(distances_m(plane.to_lonlat(coordinates - fitted.leave_one_out), given).tolist())
+    return FitQuality(tuple(residuals.tolist()), _rms(residuals), free, sigma, leave_one_out)
 
 
 def distances_m(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -1,6 +1,6 @@
 """Reference systems of sheets, and the planes in which transformations are fitted, from and to WGS 84.
 
-Every conversion is asked of pyproj without ballpark transformations: where no real one is known, that is an error.
+Every conversion excludes pyproj's ballpark transformations: where no accurate one is known, that is an error.
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ if TYPE_CHECKING:
 
 OPTION = "--map-crs"
 
-WIDE_DEG = 60.0
-"""Control points further than this from their middle are those of a map of the world, for which no local plane is
-anywhere near the map's projection."""
+MAX_LOCAL_PLANE_DEG = 60.0
+"""Largest distance of control points from their centre in a local plane. Beyond it the sheet is a map of the world, and
+no local plane comes close to its projection."""
 
 MAX_TEXT = 100_000
-"""Characters that name a reference system; the longest WKT of the EPSG registry has 20,000."""
+"""Limit of the text of a reference system; the longest WKT of the EPSG registry has 20,000 characters."""
 
 MAX_SEAMS = 24
-"""Gaps between longitudes that are tried as the seam of a map of the world."""
+"""Limit of gaps between longitudes that are tried as the seam of a map of the world."""
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Coordinates of a sheet, or a plane to fit in.
+    """Plane of a sheet's coordinates, or a plane to fit in.
 
     name : for reports
     to_lonlat : (N, 2) coordinates → (N, 2) WGS 84 longitude and latitude, degrees, longitude in [-180, 180]
-    from_lonlat : the reverse
-    accuracy_m : what is known of the transformation's accuracy, asked after use; None: it is exact, or unknown
+    from_lonlat : the inverse
+    accuracy_m : accuracy of the transformation, known only after use; None: exact, or unknown
     geographic : coordinates are angles
     """
 
@@ -53,7 +53,7 @@ class Plane:
 def crs_of(text: str, source: object = OPTION) -> CRS:
     """The horizontal part of a reference system named by a code (EPSG:2056), WKT, PROJ string or PROJJSON.
 
-    Raises PlacementError for unknown ones and those that are not tied to the earth.
+    Raises PlacementError for unknown ones and those without coordinates on the earth.
     """
     from pyproj import CRS
     from pyproj.exceptions import CRSError
@@ -61,22 +61,28 @@ def crs_of(text: str, source: object = OPTION) -> CRS:
     shown = " ".join(text[:200].split())[:60]
     try:
         if len(text) > MAX_TEXT:
-            raise DamagedFile("too long")
+            raise DamagedFile("the text is too long")
         if text.lstrip().startswith("{"):
             parse_json(text)
         crs = CRS.from_user_input(text.strip())
-    except (CRSError, DamagedFile, RecursionError, UnicodeError, ValueError):  # pyproj looks for JSON behind any brace
-        raise PlacementError(source, f"{shown!r} is no reference system", "give a code such as EPSG:2056") from None
+    except (
+        CRSError,
+        DamagedFile,
+        RecursionError,
+        UnicodeError,
+        ValueError,
+    ):  # pyproj parses text after a brace as JSON
+        raise PlacementError(source, f"{shown!r} is not a reference system", "give a code such as EPSG:2056") from None
     if crs.is_compound:
         crs = crs.sub_crs_list[0]
     if crs.is_geocentric or not (crs.is_projected or crs.is_geographic):
-        finding = f"{shown!r} has no eastings and northings, nor longitudes and latitudes on the earth"
+        finding = f"{shown!r} is neither a projected nor a geographic reference system on the earth"
         raise PlacementError(source, finding, "give the sheet's projected or geographic reference system")
     return crs
 
 
 def plane_of(crs: CRS, source: object = OPTION) -> Plane:
-    """The plane of a reference system."""
+    """Return the plane of a reference system."""
     from pyproj import Transformer
     from pyproj.exceptions import ProjError
 
@@ -84,15 +90,15 @@ def plane_of(crs: CRS, source: object = OPTION) -> Plane:
         transformer = Transformer.from_crs(crs, "EPSG:4326", always_xy=True, allow_ballpark=False)
     except ProjError:
         finding = f"no transformation from {crs.name} to WGS 84 is known"
-        raise PlacementError(source, finding, "give a reference system that pyproj can tie to WGS 84") from None
+        raise PlacementError(source, finding, "give a reference system that pyproj can transform to WGS 84") from None
     return _plane(crs.name, transformer, crs.is_geographic, source)
 
 
 def fitting_plane(crs: CRS, source: object = OPTION) -> Plane:
-    """The plane of a reference system's projection, in which points given in longitude and latitude are fitted.
+    """Return the plane of a reference system's projection, in which points in longitude and latitude are fitted.
 
-    The datum is left out, there and back: it is only the shape of the projection that a fit needs, so that it can be
-    undone exactly, and old maps' projections are often named on a sphere that nothing ties to WGS 84.
+    The datum is ignored in both directions: a fit needs only the shape of the projection, so that it can be inverted
+    exactly, and the projections of old maps are often defined on a sphere that has no transformation to WGS 84.
     """
     from pyproj import CRS, Transformer
     from pyproj.exceptions import CRSError, ProjError
@@ -103,16 +109,18 @@ def fitting_plane(crs: CRS, source: object = OPTION) -> Plane:
         radii = f"+a={ellipsoid.semi_major_metre!r} +b={ellipsoid.semi_minor_metre!r}"
         transformer = Transformer.from_crs(crs, CRS.from_proj4(f"+proj=longlat {radii} +no_defs"), always_xy=True)
     except (ProjError, CRSError, AttributeError):
-        raise PlacementError(source, f"{crs.name} cannot be computed", "give another projection") from None
+        raise PlacementError(
+            source, f"the projection of {crs.name} cannot be computed", "give another projection"
+        ) from None
     return _plane(f"{crs.name}, its projection alone", transformer, False, source)
 
 
 def local_plane(lonlat: FloatArray, pixels: FloatArray) -> Plane:
-    """A plane for control points in longitude and latitude, (N, 2) each, degrees and IMAGE.
+    """Return a plane for control points in longitude and latitude, (N, 2) each, degrees and IMAGE.
 
-    A stereographic projection about their middle: conformal, so that a similarity of the sheet stays one, and without
-    any special case at the poles and the antimeridian. For points that span more of the globe than `WIDE_DEG` to
-    each side, longitude and latitude themselves, with the seam where the pixels say that the map has it.
+    A stereographic projection about their centre: conformal, so that a similarity of the sheet stays one, and without
+    special cases at the poles and the antimeridian. For points farther than `MAX_LOCAL_PLANE_DEG` from their centre,
+    plate carrée, with the seam inferred from the pixels.
     """
     from pyproj import Transformer
 
@@ -123,8 +131,8 @@ def local_plane(lonlat: FloatArray, pixels: FloatArray) -> Plane:
     farthest = 180.0
     if length > 1e-3:
         farthest = float(np.degrees(np.arccos(np.clip(points @ middle / length, -1.0, 1.0)).max()))
-    if farthest > WIDE_DEG:
-        return _plate(lonlat, pixels)
+    if farthest > MAX_LOCAL_PLANE_DEG:
+        return _plate_carree(lonlat, pixels)
     lon_0 = float(np.degrees(np.arctan2(middle[1], middle[0])))
     lat_0 = float(np.degrees(np.arcsin(np.clip(middle[2] / length, -1.0, 1.0))))
     transformer = Transformer.from_pipeline(
@@ -134,8 +142,8 @@ def local_plane(lonlat: FloatArray, pixels: FloatArray) -> Plane:
     return _plane(f"stereographic about {lon_0:.4f} {lat_0:.4f}", transformer, False, "control points", inverse=True)
 
 
-def _plate(lonlat: FloatArray, pixels: FloatArray) -> Plane:
-    # The seam is in one of the gaps between longitudes; in the right one they follow the pixels most evenly.
+def _plate_carree(lonlat: FloatArray, pixels: FloatArray) -> Plane:
+    # The seam is in the gap between longitudes whose linear fit to the pixels has the smallest residual.
     ordered = np.sort(lonlat[:, 0])
     gaps = np.diff(np.append(ordered, ordered[0] + 360.0))
     basis = np.concatenate([pixels - pixels.mean(axis=0), np.ones((len(pixels), 1))], axis=1)
@@ -143,8 +151,8 @@ def _plate(lonlat: FloatArray, pixels: FloatArray) -> Plane:
     for index in np.argsort(-gaps)[:MAX_SEAMS]:
         opposite = float(ordered[index] + gaps[index] / 2 + 180.0)
         turned = (lonlat[:, 0] - opposite + 180.0) % 360.0 - 180.0
-        missed = turned - basis @ np.linalg.lstsq(basis, turned, rcond=None)[0]
-        if (square := float(missed @ missed)) < best:
+        residual = turned - basis @ np.linalg.lstsq(basis, turned, rcond=None)[0]
+        if (square := float(residual @ residual)) < best:
             best, middle = square, (opposite + 180.0) % 360.0 - 180.0
 
     def to_lonlat(points: FloatArray) -> FloatArray:
@@ -184,11 +192,11 @@ def _plane(name: str, transformer: Transformer, geographic: bool, source: object
 
 
 def _checked(lonlat: FloatArray, source: object, name: str = "the map") -> FloatArray:
-    """Longitudes brought into [-180, 180]; an error for what is no place on earth."""
-    # Two turns: some files count on beyond the antimeridian.
+    """Wrap longitudes into [-180, 180]; PlacementError for coordinates without a place on the earth."""
+    # Up to two turns: some files continue beyond the antimeridian.
     bad = ~np.isfinite(lonlat).all(axis=1) | (np.abs(lonlat[:, 1]) > 90.0 + 1e-9) | (np.abs(lonlat[:, 0]) > 720.0)
     if bad.any():
-        finding = f"a point of the sheet lies outside the area of {name}"
-        raise PlacementError(source, finding, f"check the reference system, and pass {OPTION} where it is another one")
+        finding = f"a point of the sheet is outside the area of {name}"
+        raise PlacementError(source, finding, f"check the reference system, or give another one with {OPTION}")
     lon = np.where(np.abs(lonlat[:, 0]) > 180.0, (lonlat[:, 0] + 180.0) % 360.0 - 180.0, lonlat[:, 0])
     return np.stack([lon, np.clip(lonlat[:, 1], -90.0, 90.0)], axis=1)

@@ -1,1 +1,1 @@
-"""Reading files from strangers within stated limits. At the bottom, since all three packages read such files."""
+"""Readers of untrusted files with explicit limits. In the lowest package, since all three packages read such files."""

@@ -1,7 +1,7 @@
-"""What readers raise where a file from elsewhere is not what its format demands.
+"""Exception of readers for files that violate their format.
 
-An error of its own, neither a ValueError nor a TypeError: those are raised by mistakes in our code as well, and a
-mistake of ours must not be reported as a damaged file.
+It is neither a ValueError nor a TypeError: those are raised by bugs as well, and a bug must not be reported as a
+damaged file.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from contextlib import contextmanager
 
 
 class DamagedFile(Exception):
-    """The file breaks a rule of its format, or a limit of ours; the message says which, without naming the file."""
+    """Violation of a rule of the file format, or of a limit set here; the message states it without naming the file."""
 
 
-def reason_of(error: BaseException, most: int = 120) -> str:
-    """An error's own words in one line of limited length, or its kind where it has none."""
-    return " ".join(str(error).split())[:most] or type(error).__name__
+def reason_of(error: BaseException, max_length: int = 120) -> str:
+    """Message of an error in one line of limited length, or its type where it has none."""
+    return " ".join(str(error).split())[:max_length] or type(error).__name__
 
 
 @contextmanager
 def decoding(what: str, *kinds: type[Exception]) -> Iterator[None]:
-    """Make DamagedFile of what a decoder raises; only the call of the decoder belongs into the block.
+    """Convert exceptions of a decoder to DamagedFile; only the call of the decoder belongs in the block.
 
-    what : begins the message, "no picture that can be read"; kinds : what the decoder is known to raise
+    what : beginning of the message, "not a readable archive"; kinds : exceptions that the decoder is known to raise
     """
     try:
         yield

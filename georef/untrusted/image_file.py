@@ -1,6 +1,6 @@
-"""Picture files from elsewhere: their size, and whether they can be decoded, at a price that is known before.
+"""Untrusted picture files: size, and test decoding at a cost that is known in advance.
 
-A few kilobytes of PNG may unpack to gigabytes of pixels, so nothing is decoded before its head has said how many.
+A few kilobytes of PNG may decompress to gigabytes of pixels, so the header is checked before anything is decoded.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ if TYPE_CHECKING:
     from PIL import Image
 
 FORMATS = ("PNG", "JPEG", "WEBP", "AVIF", "GIF", "BMP", "TIFF")
-"""What models may embed or name. Pillow knows fifty more, some of which start other programs."""
+"""Formats that models may embed or refer to. Pillow knows fifty more, some of which start other programs."""
 
 MAX_TEXTURE_PX = 1 << 26
-"""Pixels of a texture that is decoded: 8192 x 8192, beyond which clients scale down or fail; 268 MB as RGBA."""
+"""Limit of pixels of a decoded texture: 8192 x 8192, beyond which clients scale down or fail; 268 MB as RGBA."""
 
-FEW_SCANS, MAX_SCANNED_PX = 20, 1_000_000_000
-"""A progressive JPEG comes in some ten scans over the whole picture; one of ten thousand empty ones is a few
-kilobytes that take hours. More than the first are allowed where scans times pixels are below the second."""
+MAX_UNWEIGHED_SCANS, MAX_SCANNED_PX = 20, 1_000_000_000
+"""Limits of progressive JPEGs. They have some ten scans over the whole picture; a few kilobytes with 10,000 empty
+scans take hours. More scans than the first limit are allowed if scans times pixels are below the second."""
 
 
 class TooLarge(DamagedFile):
-    """A picture of more pixels than are decoded."""
+    """A picture beyond the limits of decoding."""
 
 
-class NoPicture(DamagedFile):
-    """A file that begins like no picture of the formats that are read."""
+class NotAPicture(DamagedFile):
+    """A file in none of the supported picture formats."""
 
 
 @contextmanager
 def pillow() -> Iterator[None]:
-    """Make DamagedFile of all that Pillow raises; only its calls belong into the block.
+    """Convert all exceptions of Pillow to DamagedFile; only its calls belong in the block.
 
-    Parsers of damaged pictures raise whatever they stumble over. Errors of the disk go through.
+    Its parsers raise all kinds of exceptions for damaged pictures. Disk errors pass through.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -52,20 +52,20 @@ def pillow() -> Iterator[None]:
     except Image.DecompressionBombError as error:
         raise TooLarge(f"more than {2e-6 * (Image.MAX_IMAGE_PIXELS or 0):.0f} Mpx") from error
     except UnidentifiedImageError as error:
-        raise NoPicture("no picture that can be read") from error
+        raise NotAPicture("not a readable picture") from error
     except OSError as error:
         if error.strerror:
             raise
-        raise DamagedFile(f"a damaged picture ({reason_of(error, 80)})") from error
+        raise DamagedFile(f"damaged picture ({reason_of(error, 80)})") from error
     except Exception as error:
-        raise DamagedFile(f"a damaged picture ({reason_of(error, 80)})") from error
+        raise DamagedFile(f"damaged picture ({reason_of(error, 80)})") from error
 
 
-def open_head(source: bytes | Path, formats: tuple[str, ...] = FORMATS) -> Image.Image:
-    """A picture of which only the head is read.
+def open_header(source: bytes | Path, formats: tuple[str, ...] = FORMATS) -> Image.Image:
+    """Open a picture, reading only its header.
 
-    Raises NoPicture for what is none of `formats`, TooLarge where Pillow opens none of that size, DamagedFile for a
-    damaged head and OSError for a file that cannot be read.
+    Raises NotAPicture for files in none of `formats`, TooLarge beyond Pillow's own limit, DamagedFile for a damaged
+    header and OSError for a file that cannot be read.
     """
     from PIL import Image
 
@@ -75,42 +75,42 @@ def open_head(source: bytes | Path, formats: tuple[str, ...] = FORMATS) -> Image
 
 def picture_size(data: bytes) -> tuple[int, int]:
     """Width and height of a picture. Raises DamagedFile."""
-    with open_head(data) as image:
+    with open_header(data) as image:
         return image.width, image.height
 
 
 def check_scans(image: Image.Image, data: bytes) -> None:
-    """Raise TooLarge for a progressive JPEG of so many scans that decoding it would never end.
+    """Raise TooLarge for a progressive JPEG with too many scans to decode.
 
-    image : its head, as Pillow has read it; data : the file
+    image : opened by Pillow; data : the file
     """
     if image.format not in ("JPEG", "MPO") or "progressive" not in image.info:
         return
-    # Within the data of a scan ff is followed by 00 or a restart marker: each ff da begins one.
+    # Within the data of a scan ff is followed by 00 or a restart marker, so each ff da begins a scan.
     scans = data.count(b"\xff\xda")
-    if scans > FEW_SCANS and scans * image.width * image.height > MAX_SCANNED_PX:
+    if scans > MAX_UNWEIGHED_SCANS and scans * image.width * image.height > MAX_SCANNED_PX:
         raise TooLarge(f"a progressive JPEG of {scans} scans over {image.width} x {image.height} px")
 
 
 def check_cost(image: Image.Image, data: bytes) -> None:
     """Raise TooLarge for a texture of more than `MAX_TEXTURE_PX`, or of too many scans.
 
-    image : its head; data : the file
+    image : opened by Pillow; data : the file
     """
     if image.width * image.height > MAX_TEXTURE_PX:
-        raise TooLarge(f"{image.width} x {image.height} px are more than {MAX_TEXTURE_PX / 1e6:.0f} million")
+        raise TooLarge(f"{image.width} x {image.height} px, more than {MAX_TEXTURE_PX / 1e6:.0f} million")
     check_scans(image, data)
 
 
-def check_head(data: bytes) -> None:
-    """Raise DamagedFile for a texture that no other program should be given: damaged at its head, or too large."""
-    with open_head(data) as image:
+def check_header(data: bytes) -> None:
+    """Raise DamagedFile for a texture with a damaged header or too many pixels, before another program reads it."""
+    with open_header(data) as image:
         check_cost(image, data)
 
 
 def check_texture(data: bytes) -> int:
-    """Decode a texture and say how many pixels it has. Raises TooLarge as `check_cost`, DamagedFile if damaged."""
-    with open_head(data) as image:
+    """Decode a texture; returns its number of pixels. Raises TooLarge as `check_cost`, DamagedFile if damaged."""
+    with open_header(data) as image:
         check_cost(image, data)
         with pillow():
             image.load()

@@ -1,12 +1,12 @@
-"""The members of a JSON document that a reader is going to use, checked before it does.
+"""Validation of JSON documents against a shape before a reader uses them.
 
-A shape says of each member which kind of value it may be:
+A shape defines the allowed type of each member:
 
-- `str`, `bool`, `dict`, `list`: a text, true or false, any object, any array; `WHOLE`: a whole number, 0 or more;
-  `NUMBER`: any number; `Numbers(n)`: an array of so many numbers
-- `{"name": shape}`: an object; members that are not named here are left alone, and those that are may be missing
-  unless their shape is `Needed(shape)`
-- `Values(shape)`: an object with members of any names; `[shape]`: an array
+- `str`, `bool`, `dict`, `list`: a string, true or false, any object, any array; `INDEX`: an integer, 0 or more;
+  `NUMBER`: any number; `Numbers(n)`: an array of n numbers
+- `{"name": shape}`: an object; members that are not named here are ignored, and named ones may be missing unless
+  their shape is `Required(shape)`
+- `Values(shape)`: an object with members of any names; `[shape]`: an array of such values
 - `Nullable(shape)`: the same, or null
 """
 
@@ -18,12 +18,12 @@ from typing import Any
 from georef.untrusted.damage import DamagedFile
 
 MAX_INDEX = 2**53
-"""Whole numbers count bytes and items; more than this no other program can count either."""
+"""Limit of integers that count bytes and items: the largest that a float64 holds exactly."""
 
 
 @dataclass(frozen=True)
-class Needed:
-    """A member that has to be there."""
+class Required:
+    """A required member."""
 
     shape: Any
 
@@ -37,14 +37,14 @@ class Nullable:
 
 @dataclass(frozen=True)
 class Values:
-    """An object whose members have one shape, whatever their names."""
+    """An object whose members all have one shape, under any names."""
 
     shape: Any
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """An array of numbers; count : of how many, None for any."""
+    """An array of numbers; count : its length, None for any."""
 
     count: int | None = None
 
@@ -54,53 +54,57 @@ class _Kind:
     name: str
 
 
-WHOLE, NUMBER = _Kind("whole number"), _Kind("number")
+INDEX, NUMBER = _Kind("a non-negative integer"), _Kind("a number")
 
-KINDS = {str: "text", bool: "true or false", dict: "object", list: "array"}
+KINDS = {str: "a string", bool: "true or false", dict: "an object", list: "an array"}
 
 
 def check_shape(value: Any, shape: Any, where: str = "") -> None:
-    """Raise DamagedFile, naming the JSON path, where a value has not the shape; where : the path of the value."""
+    """Raise DamagedFile, naming the JSON path, unless a value has the shape; where : the path of the value."""
     match shape:
-        case Needed():
+        case Required():
             check_shape(value, shape.shape, where)
         case Nullable():
             if value is not None:
                 check_shape(value, shape.shape, where)
         case dict():
-            _demand(isinstance(value, dict), where, "object")
+            _require(isinstance(value, dict), where, "an object")
             for name, inner in shape.items():
                 if name in value:
                     check_shape(value[name], inner, f"{where}/{name}")
-                elif isinstance(inner, Needed):
+                elif isinstance(inner, Required):
                     raise DamagedFile(f"{where or '/'} has no {name}")
         case Values():
-            _demand(isinstance(value, dict), where, "object")
+            _require(isinstance(value, dict), where, "an object")
             for name, each in value.items():
                 check_shape(each, shape.shape, f"{where}/{name[:40]}")
         case list():
-            _demand(isinstance(value, list), where, "array")
+            _require(isinstance(value, list), where, "an array")
             for index, each in enumerate(value):
                 check_shape(each, shape[0], f"{where}/{index}")
         case Numbers():
             right = isinstance(value, list) and (shape.count is None or len(value) == shape.count)
-            _demand(right and all(map(is_number, value)), where, f"array of {shape.count or ''} numbers")
+            _require(
+                right and all(map(is_number, value)),
+                where,
+                f"an array of {shape.count} numbers" if shape.count else "an array of numbers",
+            )
         case _Kind():
-            _demand(is_whole(value) if shape is WHOLE else is_number(value), where, shape.name)
+            _require(is_index(value) if shape is INDEX else is_number(value), where, shape.name)
         case _:
-            _demand(isinstance(value, shape), where, KINDS[shape])
+            _require(isinstance(value, shape), where, KINDS[shape])
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a number: true and false are none."""
+    """Whether a value is a number; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def is_whole(value: Any) -> bool:
-    """Whether a value is a whole number from 0 on that can count something."""
+def is_index(value: Any) -> bool:
+    """Whether a value is an integer from 0 to `MAX_INDEX`."""
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MAX_INDEX
 
 
-def _demand(right: bool, where: str, name: str) -> None:
+def _require(right: bool, where: str, name: str) -> None:
     if not right:
-        raise DamagedFile(f"{where or 'the document'} is no {name}")
+        raise DamagedFile(f"{where or 'the document'} is not {name}")

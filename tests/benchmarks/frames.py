@@ -185,7 +185,7 @@ def report(views: int) -> str:
     load = [os.getloadavg()[0]]
     everything = subjects()
     lines = [
-        "# Frames a second",
+        "# Frames per second",
         "",
         INTRODUCTION.format(views=views, runs=RUNS, close=CLOSE, spacing=SPACING),
         f"{platform.machine()}, {len(os.sched_getaffinity(0))} cores, Python {platform.python_version()}.",
@@ -217,10 +217,12 @@ def report(views: int) -> str:
     cold, warm = first_use()
     lines += [
         "",
-        f"First frame of a process: {cold:.1f} processor seconds while kernels are compiled, {warm:.1f} from then on.",
+        f"First frame of a process: {cold:.1f} s of CPU time while kernels are compiled, {warm:.1f} afterwards.",
     ]
     load.append(os.getloadavg()[0])
-    lines += [f"Load of the machine on the way: {', '.join(f'{one:.1f}' for one in load)}; ours alone makes at most 2."]
+    lines += [
+        f"Load of the machine during the run: {', '.join(f'{one:.1f}' for one in load)}; ours alone makes at most 2."
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -1,10 +1,10 @@
-"""Where clients put a figure, at places where mistakes show: feet, bearing, and what is seen at their pixels.
+"""Positions of a figure in clients, at places that reveal mistakes: feet, bearing, and the rendered pixels.
 
 python -m tests.clients.places [TABLE.md]
 
 The figure has a small red ball around its origin, the feet, and a small blue one in front of it, towards the nose.
 CesiumJS loads it as a GLB (Model), as 3D Tiles and as CZML on the page of `fig2mesh globe`. The loaded objects' own
-matrices, multiplied by CesiumJS, say where feet and nose are; the place asked for comes from CesiumJS as well
+matrices, multiplied by CesiumJS, give the positions of feet and nose; the requested place comes from CesiumJS as well
 (`Cartesian3.fromDegrees`, `Transforms.eastNorthUpToFixedFrame`). Then a picture is taken, and the middle of each
 ball's pixels is compared with where CesiumJS projects the point to; this is finer than `pickPosition`, whose depth
 has millimetres and whose pixel is whole, and it sees everything up to the screen. `Scene.pick` must name the ball.
@@ -44,7 +44,7 @@ PLACES = {
 }
 FORMATS = ("GLB", "3D Tiles", "CZML", "USD")
 NOSE = (0.0, 1.0, 0.6)
-"""ASSET, metres: so far out that a pixel is no more than half a degree."""
+"""ASSET, metres: far enough out that a pixel is at most half a degree."""
 BALL_M = 0.04
 SIZE = 640
 
@@ -52,11 +52,11 @@ FEET_TOLERANCE_M, BEARING_TOLERANCE_DEG, PICK_TOLERANCE_PX = 1e-3, 0.01, 1.0
 
 
 @dataclass(frozen=True)
-class Found:
-    """What one client made of one place: errors of the feet (m) and of the bearing (°), and in the picture (px).
+class PlaceErrors:
+    """Errors of one client at one place: of the feet (m) and of the bearing (°), and in the picture (px).
 
-    picked_px : the larger one of the misses of feet and nose; None where there is no picture
-    names : what is picked at feet and nose
+    picked_px : the larger error of feet and nose; None without a picture
+    names : names of the objects picked at feet and nose
     """
 
     place: str
@@ -91,7 +91,7 @@ STAND = """(async () => {{
   const nose = found({nose});
   const direction = Cartesian3.subtract(nose, feet, new Cartesian3());
   const ahead = Matrix4.multiplyByPointAsVector(enuFromEcef, direction, new Cartesian3());
-  // The camera stands where the place asked for says, not where the figure is.
+  // The camera is placed relative to the requested place, not to the figure.
   const bearing = Angle.toRadians({heading});
   const [, up, out] = {nose};
   const noseInEnu = new Cartesian3(out * Math.sin(bearing), out * Math.cos(bearing), up);
@@ -155,8 +155,8 @@ def _ball(centre: tuple[float, float, float], columns: int = 32, rows: int = 16)
     return BALL_M * vertices + centre, faces
 
 
-def measure(folder: Path, look: Look, cesium: Path) -> list[Found]:
-    """All places in all formats, in one session of the browser.
+def measure(folder: Path, look: Look, cesium: Path) -> list[PlaceErrors]:
+    """Measure all places in all formats, in one session of the browser.
 
     folder : where the files go
     """
@@ -193,35 +193,35 @@ def measure(folder: Path, look: Look, cesium: Path) -> list[Found]:
         order.append((name, "USD"))
     assets = find_assets(tuple(paths))
     with serving(page_server(globe_page(assets), 0, {"cesium": cesium}, page_files(assets))) as address:
-        seen = look(address, *actions, size=(SIZE, SIZE))
-    if seen["messages"]:
-        raise RuntimeError(f"the page says {seen['messages']}")
-    elsewhere = [request for request in seen["requests"] if not request.startswith(address)]
+        view = look(address, *actions, size=(SIZE, SIZE))
+    if view["messages"]:
+        raise RuntimeError(f"messages of the page: {view['messages']}")
+    elsewhere = [request for request in view["requests"] if not request.startswith(address)]
     if elsewhere:
-        raise RuntimeError(f"the page asks {elsewhere}")
-    results = iter(seen["results"][1:])
+        raise RuntimeError(f"the page requests {elsewhere}")
+    results = iter(view["results"][1:])
     found = []
     for name, kind in order:
         facts = next(results)["value"]
         turn = (facts["bearing"] - PLACES[name].heading_deg + 180) % 360 - 180
         if kind == "USD":
-            found.append(Found(name, kind, facts["feet_m"], abs(turn)))
+            found.append(PlaceErrors(name, kind, facts["feet_m"], abs(turn)))
             continue
         image = pixels(next(results)["png"])[..., :3].astype(float)
         misses = [np.hypot(*(_middle(image, channel) - facts[key])) for channel, key in ((0, "feet"), (2, "nose"))]
-        found.append(Found(name, kind, facts["feet_m"], abs(turn), float(max(misses)), tuple(facts["names"])))
+        found.append(PlaceErrors(name, kind, facts["feet_m"], abs(turn), float(max(misses)), tuple(facts["names"])))
     return found
 
 
 def _middle(image: NDArray[np.float64], channel: int) -> NDArray[np.float64]:
-    """The middle (x, y) of a ball's pixels: how far a pixel is from white towards its colour is its share."""
+    """Centroid (x, y) of a ball's pixels, weighted by their difference from white towards its colour."""
     share = (255 - image[..., 1]) / 255 * (image[..., channel] > 250) * (image[..., 2 - channel] < 250)
     rows, columns = np.indices(share.shape) + 0.5
     return np.array([(columns * share).sum(), (rows * share).sum()]) / share.sum()
 
 
-def table(found: list[Found]) -> str:
-    """The table as Markdown."""
+def table(found: list[PlaceErrors]) -> str:
+    """Format the table as Markdown."""
     lines = [
         "# Feet and bearing in clients",
         "",

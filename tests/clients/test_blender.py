@@ -1,4 +1,4 @@
-"""Blender opens what is written: as large as asked for, upright, its front to the front, in the drawing's colours."""
+"""Files opened in Blender: requested size, upright, front view in front, colours of the drawing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.blender import looked_at
 from tests.exporters.analytic import HEIGHT, RADIUS, asset, capsule
 
 COLOUR_TOLERANCE = 12
-"""Of 255: 16 samples a pixel under an even sky leave some noise on lit surfaces."""
+"""Of 255: 16 samples per pixel under a uniform sky leave some noise on lit surfaces."""
 SIZE = (120, 240)
 
 
@@ -61,7 +61,7 @@ def test_size_orientation_material_and_picture(tmp_path: Path, suffix: str) -> N
 
 @pytest.mark.slow
 def test_usd_turns_to_its_bearing(tmp_path: Path) -> None:
-    """A stage is x east, z south for Cesium: in Blender y is north, and a figure that looks east moves to +x."""
+    """A stage is x east, z south for Cesium: in Blender y is north, and a figure that faces east moves to +x."""
     path = tmp_path / "figure.usdc"
     write(lopsided(GeoPlacement(8.5417, 47.3769, heading_deg=90.0)), path)
     found = looked_at(path)

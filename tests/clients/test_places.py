@@ -1,4 +1,4 @@
-"""CesiumJS and USD agree about where figures stand, at five places of the earth."""
+"""Agreement of CesiumJS and USD about the positions of figures, at five places on the earth."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.clients.places import (
 
 
 @pytest.mark.slow
-def test_feet_and_nose_are_where_they_were_asked_for(tmp_path: Path, look: Look, cesium: Path) -> None:
+def test_feet_and_nose_are_at_the_requested_place(tmp_path: Path, look: Look, cesium: Path) -> None:
     found = measure(tmp_path, look, cesium)
     assert [(each.place, each.format) for each in found] == [(place, kind) for place in PLACES for kind in FORMATS]
     for each in found:

@@ -1,4 +1,4 @@
-"""py3dtiles reads the tilesets that are written."""
+"""Tilesets read by py3dtiles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.exporters.analytic import ZURICH, asset
 def test_levels_triangles_volumes_and_place(tmp_path: Path) -> None:
     figure = asset(ZURICH)
     write_tileset(figure, tmp_path)
-    found = py3dtiles.read("py3dtiles_look.py", tmp_path / "tileset.json")
+    found = py3dtiles.read("py3dtiles_levels.py", tmp_path / "tileset.json")
     assert [tile["uri"] for tile in found] == ["farmer_lod2.glb", "farmer_lod1.glb", "farmer.glb"]
     assert [tile["triangles"] for tile in found] == [len(mesh.faces) for mesh in reversed(figure.lods)]
     errors = [*(mesh.deviation_m[1] for mesh in reversed(figure.lods[1:])), 0.0]

@@ -1,4 +1,4 @@
-"""A textured solid whose every property is known by formula: the oracle of the exporter tests."""
+"""A textured solid whose properties are all known by formula: ground truth of the exporter tests."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PART_NAMES = {1: "torso", 2: "head", 9: "l_upper_leg"}
 
 
 def capsule(columns: int = 32, rings: int = 8, **changes: Any) -> TexturedMesh:
-    """An upright capsule that stands on the origin, its texture wrapped round like a label on a can.
+    """An upright capsule that stands on the origin, with a cylindrical texture.
 
     columns, rings : faces around, and along each half sphere and the cylinder between. The first column of vertices
         is doubled (u = 0 and u = 1) and each pole has one vertex per column, as texture seams want it.
@@ -66,7 +66,7 @@ def capsule(columns: int = 32, rings: int = 8, **changes: Any) -> TexturedMesh:
 
 
 def gradient_texture(size: int = 64) -> Texture:
-    """Red grows with u, green with v, so that a colour names its place."""
+    """Red grows with u, green with v, so that a colour identifies its position."""
     ramp = (np.arange(size) + 0.5) / size * 255
     pixels = np.zeros((size, size, 3))
     pixels[:, :, 0], pixels[:, :, 1], pixels[:, :, 2] = ramp[None, :], ramp[:, None], 128
@@ -74,7 +74,7 @@ def gradient_texture(size: int = 64) -> Texture:
 
 
 def half_observed(size: int = 64) -> Texture:
-    """The front half, a quarter of the way round to three quarters, was seen."""
+    """The front half, a quarter of the way round to three quarters, is observed."""
     pixels = np.zeros((size, size, 1), np.uint8)
     pixels[:, size // 4 : 3 * size // 4] = 255
     return Texture(pixels)

@@ -1,4 +1,4 @@
-"""Files and folders appear whole or not at all, whatever happens while they are written."""
+"""Files and folders are written atomically, even with failures in between."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_a_body_that_fails_leaves_the_disk_as_it_was(
 
 
 @pytest.mark.parametrize("there_before", [False, True])
-def test_the_content_is_whole_after_success_and_not_seen_before(tmp_path: Path, there_before: bool) -> None:
+def test_the_content_is_complete_after_success_and_not_visible_before(tmp_path: Path, there_before: bool) -> None:
     target = tmp_path / "a.npz"
     if there_before:
         target.write_bytes(b"old")
@@ -87,7 +87,7 @@ def test_the_content_is_whole_after_success_and_not_seen_before(tmp_path: Path, 
     assert _contents(tmp_path) == {"a.npz": b"new"}
 
 
-def test_a_rename_that_the_disk_refuses_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_rename_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(source: Path, target: Path) -> None:
         raise OSError(28, "No space left on device")
 
@@ -111,7 +111,7 @@ def test_a_missing_folder_is_an_error_and_is_not_made(tmp_path: Path) -> None:
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"])))
-def test_text_is_written_as_it_is(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+def test_text_is_written_unchanged(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     folder = tmp_path_factory.mktemp("text")
     write_text(folder / "one", text)
     with atomic_text(folder / "two") as stream:
@@ -119,7 +119,7 @@ def test_text_is_written_as_it_is(tmp_path_factory: pytest.TempPathFactory, text
     assert _contents(folder) == {"one": text.encode(), "two": text.encode()}
 
 
-def test_files_are_readable_as_the_umask_gives(tmp_path: Path) -> None:
+def test_permissions_of_files_follow_the_umask(tmp_path: Path) -> None:
     mask = os.umask(0o022)
     try:
         write_text(tmp_path / "a", "new")
@@ -163,7 +163,7 @@ def _die_halfway(path: Path) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_what_a_killed_process_leaves_is_swept(tmp_path: Path) -> None:
+def test_leftovers_of_a_killed_process_are_removed(tmp_path: Path) -> None:
     (tmp_path / "deep").mkdir()
     (tmp_path / "a").write_text("old")
     (tmp_path / ".fig2mesh").mkdir()
@@ -186,7 +186,7 @@ def test_messages_name_the_file_that_is_written(tmp_path: Path) -> None:
     assert without_temporary(str(caught.value)) == f"[Errno 2] No such file or directory: '{tmp_path / 'a.json'}'"
 
 
-def test_an_old_folder_is_replaced_whole(tmp_path: Path) -> None:
+def test_an_old_folder_is_replaced_completely(tmp_path: Path) -> None:
     target = tmp_path / "deep" / "target"
     with _folder(target):
         pass

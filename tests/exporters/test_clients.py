@@ -25,7 +25,7 @@ PLACES = {
 HEADINGS = (0.0, 45.0, 90.0, 180.0, 271.25, 359.99)
 
 
-def test_cesium_finds_feet_and_nose_where_they_were_asked_for(tmp_path: Path, node: RunScript) -> None:
+def test_feet_and_nose_are_at_the_requested_place_in_cesium(tmp_path: Path, node: RunScript) -> None:
     jobs, headings = [], []
     for name, (lon, lat, height) in PLACES.items():
         for heading in HEADINGS:

@@ -69,15 +69,15 @@ def test_cesium_draws_just_the_figures_within_the_distance(
     views.append({"lon_deg": first.lon_deg, "lat_deg": first.lat_deg, "height_m": first.height_m + visible_from / 2})
     views.append({"lon_deg": -170.0, "lat_deg": -40.0, "height_m": 10.0})
     found = node("visible.mjs", stdin={"tileset": str(tmp_path / "tileset.json"), "views": views})["views"]
-    for view, seen in zip(views, found, strict=True):
+    for view, visible in zip(views, found, strict=True):
         camera = ecef_from_geodetic([[view["lon_deg"], view["lat_deg"], view["height_m"]]])
         away = {each.contents[0]: _distance(camera, each) for each in figures}
         # Drawn from where 16 pixels are one of 1080 rows at 60 degrees across, to float32's digits of nothing here.
-        assert set(seen["drawn"]) == {uri for uri, distance in away.items() if distance < visible_from * (1 - 1e-9)}
+        assert set(visible["drawn"]) == {uri for uri, distance in away.items() if distance < visible_from * (1 - 1e-9)}
     assert found[-1] == {"drawn": [], "files": 0, "visited": 0}
     assert found[-2]["drawn"]
-    # Nor is the rest of the tree looked through: 700 figures, 101 nodes above them.
-    assert all(seen["visited"] < 801 for seen in found)
+    # Nor is the rest of the tree visited: 700 figures, 101 nodes above them.
+    assert all(each["visited"] < 801 for each in found)
 
 
 def test_cesium_draws_figures_of_any_heights_from_as_far_as_their_own(tmp_path: Path, node: RunScript) -> None:
@@ -100,12 +100,12 @@ def test_cesium_draws_figures_of_any_heights_from_as_far_as_their_own(tmp_path: 
         for share in (0.01, 0.5, 0.99, 1.01)
     ]
     found = node("visible.mjs", stdin={"tileset": str(tmp_path / "tileset.json"), "views": views})["views"]
-    for view, seen in zip(views, found, strict=True):
+    for view, visible in zip(views, found, strict=True):
         camera = ecef_from_geodetic([[view["lon_deg"], view["lat_deg"], view["height_m"]]])
         near = {each.contents[0] for each in figures if _distance(camera, each) < ranges[each.contents[0]]}
-        assert set(seen["drawn"]) == near
+        assert set(visible["drawn"]) == near
     for number, each in enumerate(first.values()):
-        drawn = [each.contents[0] in seen["drawn"] for seen in found[4 * number : 4 * number + 4]]
+        drawn = [each.contents[0] in visible["drawn"] for visible in found[4 * number : 4 * number + 4]]
         assert drawn == [True, True, True, False]
 
 
@@ -152,13 +152,13 @@ def test_a_figure_is_drawn_where_a_client_flies_to(tmp_path: Path, look: Look, c
     write(tall(height, "giant"), tmp_path / "one")
     write_figures([tmp_path / "one"], tmp_path / "all")
     for folder in ("one", "all"):
-        zoomed, looked = _page(tmp_path / folder, look, cesium, ZOOM, AT.format(out=0))
+        zoomed, viewed = _page(tmp_path / folder, look, cesium, ZOOM, AT.format(out=0))
         assert zoomed == [0, True]
-        assert looked == [0, None]
+        assert viewed == [0, None]
 
 
 @pytest.mark.slow
-def test_the_globe_flies_into_a_short_range_or_says_that_nothing_is_drawn(
+def test_the_globe_flies_into_a_short_range_or_reports_that_nothing_is_drawn(
     tmp_path: Path, look: Look, cesium: Path
 ) -> None:
     # A canvas of 270 rows has a quarter of the range.
@@ -189,7 +189,7 @@ def test_levels_of_detail_follow_their_errors_in_cesium(tmp_path: Path, node: Ru
     for folder, prefix in ((tmp_path, ""), (tmp_path / "many", "figures/")):
         found = node("visible.mjs", stdin={"tileset": str(folder / "tileset.json"), "views": views})["views"]
         names = [[prefix + name] if name else [] for name in wanted]
-        assert [seen["drawn"] for seen in found] == names
+        assert [each["drawn"] for each in found] == names
 
 
 def test_cesium_reads_the_metadata(four: Path, tmp_path: Path, node: RunScript) -> None:
@@ -205,7 +205,7 @@ def test_cesium_reads_the_metadata(four: Path, tmp_path: Path, node: RunScript) 
         assert facts["observedShare"] == pytest.approx(0.5, abs=0.01)
 
 
-def test_cesium_puts_entities_of_czml_where_they_were_asked_for(tmp_path: Path, node: RunScript) -> None:
+def test_entities_of_czml_are_at_the_requested_place_in_cesium(tmp_path: Path, node: RunScript) -> None:
     wanted = {}
     for place, (lon, lat, height) in PLACES.items():
         for heading in HEADINGS:
@@ -273,7 +273,7 @@ def test_tiles_tools_reads_version_1_0(four: Path, tmp_path: Path, tiles_tools: 
 @pytest.mark.parametrize("version", ["1.0", "1.1"])
 def test_py3dtiles_reads_many(four: Path, tmp_path: Path, version: str) -> None:
     write_figures([four], tmp_path / "out", version=version)
-    found = py3dtiles.read("py3dtiles_read.py", tmp_path / "out" / "tileset.json")
+    found = py3dtiles.read("py3dtiles_contents.py", tmp_path / "out" / "tileset.json")
     assert found["version"] == version
     assert found["tiles"] == 7
     assert len(found["contents"]) == 6

@@ -15,11 +15,11 @@ def test_known_values() -> None:
     assert srgb_from_linear(np.array([0.0, 0.0031308, 0.5, 1.0])) == pytest.approx([0, 0.04045, 0.73536, 1], abs=1e-5)
 
 
-def test_there_and_back_gives_every_byte() -> None:
+def test_round_trip_of_every_byte() -> None:
     assert np.allclose(srgb_from_linear(linear_from_srgb(BYTES)), BYTES, atol=1e-7)
 
 
-def test_both_rise_and_keep_shape_and_precision() -> None:
+def test_both_are_monotone_and_keep_shape_and_precision() -> None:
     for curve in (linear_from_srgb, srgb_from_linear):
         assert (np.diff(curve(np.linspace(0, 1, 10_001))) > 0).all()
         assert curve(BYTES.reshape(4, 64)).shape == (4, 64)

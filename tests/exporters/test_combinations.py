@@ -1,4 +1,4 @@
-"""Files of every combination of options that changes what is in them: all validators find nothing.
+"""Files of every combination of options that affect them pass all validators.
 
 All pairs of options are covered, as faults of writers come from two things that meet.
 """
@@ -100,7 +100,7 @@ def test_validators_are_clean(tmp_path: Path, node: RunScript, codecs: Path, mon
         models += [file for file in files if file.suffix in (".glb", ".gltf")]
     assert len(models) >= 20
     for model, report in zip(models, node("validate_gltf.mjs", *models), strict=True):
-        # The validator has not heard of KTX 2: for images of that kind it says so twice.
+        # The validator does not support KTX 2 and reports each such image twice.
         issues = [
             message
             for message in report["issues"]["messages"]

@@ -1,4 +1,4 @@
-"""Sound files of other programs: no errors, no warnings of ours, and facts that are true; damaged ones: errors."""
+"""Valid files of other programs: no errors, no own warnings, and true facts; damaged ones: errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.exporters.analytic import ZURICH, asset, capsule
 from tests.node import RunScript
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], "<f4")
-"""Two triangles as a strip; nothing of a solid."""
+"""Two triangles as a strip; not a solid."""
 
 
 def _worse(findings: list[Finding]) -> list[Finding]:
@@ -35,7 +35,7 @@ def _codes(findings: list[Finding], severity: str = "error") -> set[str]:
 
 
 def _gltf(path: Path, **changes: Any) -> Path:
-    """A glTF file with everything that ours never have: a scene of two nodes, strips, a skin, morphs, a camera."""
+    """A glTF file with features that fig2mesh never writes: a scene of two nodes, strips, a skin, morphs, a camera."""
     arrays: dict[str, tuple[Any, str]] = {
         "position": (SQUARE, "VEC3"),
         "strip": (np.array([0, 1, 2, 3], "<u2"), "SCALAR"),
@@ -107,7 +107,7 @@ def _gltf(path: Path, **changes: Any) -> Path:
     return path
 
 
-def test_a_scene_that_is_no_figure(tmp_path: Path, node: RunScript) -> None:
+def test_a_foreign_gltf_scene(tmp_path: Path, node: RunScript) -> None:
     path = _gltf(tmp_path / "a.gltf")
     (report,) = node("validate_gltf.mjs", path)
     assert report["issues"]["numErrors"] == 0, report["issues"]["messages"]  # a fair example
@@ -157,7 +157,7 @@ GLTF_VARIATIONS: dict[str, tuple[dict[str, Any], str]] = {
 
 
 @pytest.mark.parametrize("name", GLTF_VARIATIONS)
-def test_what_is_only_unlike_ours_is_worth_an_info(tmp_path: Path, name: str) -> None:
+def test_differences_from_own_files_are_infos(tmp_path: Path, name: str) -> None:
     changes, code = GLTF_VARIATIONS[name]
     path = _gltf(tmp_path / "a.gltf", **changes)
     findings = validate(path, external=False)
@@ -165,7 +165,7 @@ def test_what_is_only_unlike_ours_is_worth_an_info(tmp_path: Path, name: str) ->
     assert code in _codes(findings, "info")
 
 
-def test_what_the_format_demands_is_demanded_of_all(tmp_path: Path) -> None:
+def test_rules_of_the_format_apply_to_all_files(tmp_path: Path) -> None:
     missing = _gltf(tmp_path / "a.gltf", buffers=[{"byteLength": 99, "uri": "gone.bin"}])
     assert _codes(validate(missing, external=False)) == {"UNREADABLE"}
     beyond = _gltf(tmp_path / "b.gltf", images=[{"uri": "gone.png"}, {"uri": "data:image/png;base64,AAAA"}])
@@ -178,7 +178,7 @@ def test_what_the_format_demands_is_demanded_of_all(tmp_path: Path) -> None:
 
 
 def _usd(path: Path) -> Path:
-    """A stage with everything that ours never have: z up, centimetres, quads, smoothing, references, variants."""
+    """A stage with features that fig2mesh never writes: z up, centimetres, quads, smoothing, references, variants."""
     part = Usd.Stage.CreateNew(str(path.with_name("part.usda")))
     box = UsdGeom.Mesh.Define(part, "/Box")
     part.SetDefaultPrim(box.GetPrim())
@@ -207,7 +207,7 @@ def _usd(path: Path) -> Path:
     return path
 
 
-def test_a_stage_that_is_no_figure(tmp_path: Path) -> None:
+def test_a_foreign_usd_stage(tmp_path: Path) -> None:
     path = _usd(tmp_path / "scene.usda")
     findings = validate(path)
     assert _worse(findings) == []
@@ -218,7 +218,7 @@ def test_a_stage_that_is_no_figure(tmp_path: Path) -> None:
     assert (facts["solid"], facts["components"], facts["lods"]) == (True, 2, None)
 
 
-def test_a_reference_that_is_gone_is_an_error(tmp_path: Path) -> None:
+def test_a_missing_reference_is_an_error(tmp_path: Path) -> None:
     path = _usd(tmp_path / "scene.usda")
     (tmp_path / "part.usda").unlink()
     held = Sdf.Layer.Find(str(tmp_path / "part.usda"))
@@ -278,7 +278,7 @@ def test_places_of_a_stage_must_agree(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     "change", [{"lat_deg": 90.5}, {"lon_deg": "east"}, {"crs": "EPSG:4326"}, {"heading_deg": None}, {"more": 1}]
 )
-def test_places_of_gltf_must_be_places(tmp_path: Path, change: dict[str, Any]) -> None:
+def test_places_of_gltf_must_be_valid(tmp_path: Path, change: dict[str, Any]) -> None:
     write(asset(ZURICH, lods=(capsule(8, 2),)), tmp_path / "a.gltf")
     document = json.loads((tmp_path / "a.gltf").read_text())
     document["asset"]["extras"]["georeference"] |= change
@@ -287,7 +287,7 @@ def test_places_of_gltf_must_be_places(tmp_path: Path, change: dict[str, Any]) -
 
 
 @pytest.mark.parametrize("lonlat", [(0.0, 0.0), (-180.0, 10.0), (180.0, -89.9999), (13.0, 90.0), (-67.72, -49.3)])
-def test_places_come_back_everywhere(tmp_path: Path, lonlat: tuple[float, float]) -> None:
+def test_places_round_trip_everywhere(tmp_path: Path, lonlat: tuple[float, float]) -> None:
     place = GeoPlacement(*lonlat, height_m=-430.0, heading_deg=350.0)
     for name in ("a.glb", "a.usdc"):
         write(asset(place, lods=(capsule(8, 2),)), tmp_path / name)
@@ -302,5 +302,5 @@ def test_packages_are_checked_as_archives(tmp_path: Path) -> None:
         for name, data in [("read.txt", b"me"), *members.items()]:
             archive.writestr(name, data)
     messages = {finding.message for finding in validate(tmp_path / "b.usdz") if finding.code == "PACKAGE"}
-    assert {"the first file is no layer", "is compressed", "is of a type that packages may not hold"} <= messages
+    assert {"the first file is not a layer", "is compressed", "is of a type that packages may not hold"} <= messages
     assert any("multiple of 64" in message for message in messages)

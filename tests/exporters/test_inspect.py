@@ -58,7 +58,7 @@ def test_levels_of_detail_of_usd(tmp_path: Path, name: str) -> None:
     assert all(lod["solid"] and lod["texture_px"] == [64, 64] for lod in lods)
 
 
-def test_tilesets_and_maps_of_many_say_how_many(tmp_path: Path) -> None:
+def test_tilesets_and_indexes_of_many_report_their_number(tmp_path: Path) -> None:
     for number in range(3):
         write(asset(ZURICH, lods=(capsule(8, 2),)), tmp_path / "in" / f"{number}.glb")
     write_figures([tmp_path / "in"], tmp_path / "out")
@@ -69,14 +69,14 @@ def test_tilesets_and_maps_of_many_say_how_many(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", FACTS[:-3])
-def test_without_a_place_there_is_none(tmp_path: Path, name: str) -> None:
+def test_files_without_a_place_have_no_placement(tmp_path: Path, name: str) -> None:
     write(asset(copyright="", metadata={}), tmp_path / name)
     facts = inspect(tmp_path / name)
     assert facts["placement"] is None
     assert facts["lods"] is None or name.startswith("a.usd")
 
 
-def test_the_place_of_a_tileset_is_what_its_transform_does(tmp_path: Path) -> None:
+def test_the_place_of_a_tileset_is_that_of_its_transform(tmp_path: Path) -> None:
     write(asset(GeoPlacement(-70.0, -30.0, 10.0, heading_deg=200.0)), tmp_path)
     document = json.loads((tmp_path / "tileset.json").read_text())
     document["asset"]["extras"]["georeference"]["lon_deg"] = 0.0
@@ -85,7 +85,7 @@ def test_the_place_of_a_tileset_is_what_its_transform_does(tmp_path: Path) -> No
     assert (place["lon_deg"], place["heading_deg"]) == pytest.approx((-70.0, 200.0), abs=1e-6)
 
 
-def test_holes_are_seen(tmp_path: Path) -> None:
+def test_holes_are_reported(tmp_path: Path) -> None:
     whole = capsule()
     write(asset(lods=(capsule(faces=whole.faces[1:]),)), tmp_path / "a.glb")
     facts = inspect(tmp_path / "a.glb")
@@ -93,8 +93,8 @@ def test_holes_are_seen(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", [*(f"a{suffix}" for suffix in FORMATS), "tileset.json", "a.txt"])
-def test_garbage_and_nothing_are_errors_of_the_input(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ExportError, match="is not there"):
+def test_invalid_and_missing_files_are_input_errors(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ExportError, match="no such file or folder; check the path"):
         inspect(tmp_path / name)
     (tmp_path / name).write_bytes(b"garbage \x00\xff")
     with pytest.raises(ExportError, match=name):

@@ -1,4 +1,4 @@
-"""Files of each profile in the program that they are for, or in that program's own validator."""
+"""Files of each profile in their client, or in its own validator."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_cesiumjs_shows_compressed_models_like_plain_ones(
     # A capsule 0.6 m by 1.8 m, upright: it stands in the middle, three times as high as wide.
     rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
     assert np.ptp(rows) / np.ptp(columns) == pytest.approx(HEIGHT / 0.6, rel=0.1)
-    # The drawing's red grows to the right and its green downwards: the front is what is seen.
+    # The drawing's red grows to the right and its green downwards: the front is visible.
     assert plain[100, columns[-5], 0] > plain[100, columns[5], 0] + 50
     assert plain[rows[-9], 60, 1] > plain[rows[9], 60, 1] + 50
     for each, model in zip(found[1:], models[1:], strict=True):
@@ -71,17 +71,17 @@ def test_nvidias_validator_finds_nothing(tmp_path: Path, suffix: str, lods: int)
     write(asset(ZURICH, lods=asset().lods[:lods]), path, profile=PROFILES["omniverse"])
     tool = Path(sys.executable).with_name("nvidia_usd_validate")
     if not tool.is_file():
-        pytest.skip("usd-validation-nvidia is not installed: not looked at by NVIDIA's validator")
+        pytest.skip("usd-validation-nvidia is not installed: not checked by NVIDIA's validator")
     command = [str(tool), "--json-output", str(report), str(path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert json.loads(report.read_text()) == {"status": "PASS", "rules": []}, done.stderr
 
 
 def test_assimp_reads_what_qgis_is_given(tmp_path: Path) -> None:
-    # QGIS reads the models of its 3D symbols through Qt 3D, which has Assimp do it.
+    # QGIS reads the models of its 3D symbols through Qt 3D, which uses Assimp.
     tool = shutil.which("assimp")
     if tool is None:
-        pytest.skip("assimp is not there: models for QGIS not read by it; apt-get install assimp-utils")
+        pytest.skip("assimp not found: models for QGIS not read by it; apt-get install assimp-utils")
     given = asset(ZURICH)
     for suffix in (".glb", ".gltf", ".obj"):
         write(given, tmp_path / f"farmer{suffix}", profile=PROFILES["qgis"])

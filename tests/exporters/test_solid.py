@@ -146,7 +146,7 @@ def test_a_body_turned_inside_out_or_hollow_does_not_face_outward(name: str) -> 
     hollow = trimesh.util.concatenate([body, cavity])
     found = _check_against_trimesh(hollow.vertices, hollow.faces)
     assert (found.solid, found.outward, found.components) == (True, False, 2)
-    assert found.least_volume == pytest.approx(-body.volume / 8)
+    assert found.min_volume == pytest.approx(-body.volume / 8)
     assert found.volume == pytest.approx(body.volume * 7 / 8)
 
 

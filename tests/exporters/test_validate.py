@@ -130,7 +130,9 @@ def test_files_cut_short(tmp_path: Path, cut: int) -> None:
     ],
 )
 @pytest.mark.parametrize("name", ["a.glb", "a.usdc", "a.ply", "a.obj", "tiles"])
-def test_what_is_no_solid_is_found_in_every_format(tmp_path: Path, name: str, faces: Any, code: str) -> None:
+def test_meshes_that_are_not_solid_are_reported_in_every_format(
+    tmp_path: Path, name: str, faces: Any, code: str
+) -> None:
     broken = asset(ZURICH, lods=(capsule(8, 2, faces=faces(capsule(8, 2).faces)),))
     write(broken, tmp_path / name)
     assert code in _codes(validate(tmp_path / name, external=False))
@@ -258,13 +260,13 @@ def test_garbage_is_unreadable_not_a_crash(tmp_path: Path, name: str) -> None:
     assert _codes(validate(tmp_path / name, external=False)) == {"UNREADABLE"}
 
 
-def test_obj_whose_texture_or_library_is_gone(tmp_path: Path) -> None:
+def test_obj_with_a_missing_texture_or_library(tmp_path: Path) -> None:
     write(SMALL, tmp_path / "a.obj")
     (tmp_path / "a_texture.png").unlink()
     assert _codes(validate(tmp_path / "a.obj")) == {"REFERENCE"}
 
 
-def test_findings_come_worst_first_and_read_as_a_line(tmp_path: Path) -> None:
+def test_findings_are_sorted_by_severity_and_one_line_each(tmp_path: Path) -> None:
     write(SMALL, tmp_path / "a.gltf")
     document = json.loads((tmp_path / "a.gltf").read_text())
     document["extensionsRequired"] = ["EXT_mesh_features"]
@@ -276,7 +278,7 @@ def test_findings_come_worst_first_and_read_as_a_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["gone.glb", "a.txt"])
-def test_what_cannot_be_checked_is_said(tmp_path: Path, name: str) -> None:
+def test_missing_and_unsupported_files_are_errors(tmp_path: Path, name: str) -> None:
     (tmp_path / "a.txt").write_text("")
     with pytest.raises(ExportError, match=name):
         validate(tmp_path / name)
@@ -292,7 +294,7 @@ def test_khronos_findings_are_among_them(tmp_path: Path, node_modules: Path, mon
     assert _codes(validate(tmp_path / "a.gltf"), "warning") == {"VALUE_NOT_IN_LIST"}
 
 
-def test_missing_khronos_validator_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_khronos_validator_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NODE_PATH", "")
     write(SMALL, tmp_path / "a.glb")
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Outputs appear whole or not at all, and what stands in their way is said in one line."""
+"""Outputs are written atomically, and obstacles are reported in one line."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ def _contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_all_files_are_there_and_nothing_else(tmp_path: Path, target: str) -> None:
+def test_exactly_the_expected_files_are_written(tmp_path: Path, target: str) -> None:
     written = write(SMALL, f"{tmp_path}/{target}")
     assert {str(path.relative_to(tmp_path)) for path in written} == set(_contents(tmp_path))
     assert written[-1].name == (Path(target).name if Path(target).suffix else "tileset.json")
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_overwriting_needs_the_word_and_then_replaces(tmp_path: Path, target: str) -> None:
+def test_overwriting_needs_the_option_and_then_replaces(tmp_path: Path, target: str) -> None:
     path = f"{tmp_path}/{target}"
     write(SMALL, path)
     before = _contents(tmp_path)
-    with pytest.raises(ExportError, match=r"exists already; use --overwrite"):
+    with pytest.raises(ExportError, match=r"already exists; use --overwrite"):
         write(OTHER, path)
     assert _contents(tmp_path) == before
     write(OTHER, path, overwrite=True)
@@ -64,7 +64,7 @@ def test_a_failure_midway_leaves_the_disk_as_it_was(
         real(source, destination)
 
     monkeypatch.setattr(os, "replace", replace)
-    files = {"tiles": 3, "a.usda": 3}.get(Path(target).name) or len(FORMATS[Path(target).suffix].beside) + 1
+    files = {"tiles": 3, "a.usda": 3}.get(Path(target).name) or len(FORMATS[Path(target).suffix].companions) + 1
     if failing >= files:
         assert len(write(OTHER, tmp_path / target, overwrite=True)) == files
         return
@@ -92,9 +92,9 @@ def test_foreign_files_in_the_folder_of_a_tileset_are_kept(tmp_path: Path) -> No
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
-def test_a_foreign_file_of_a_name_we_need_is_not_replaced_unasked(tmp_path: Path) -> None:
+def test_a_foreign_file_of_a_needed_name_is_not_replaced_without_the_option(tmp_path: Path) -> None:
     (tmp_path / "farmer.glb").write_text("mine")
-    with pytest.raises(ExportError, match=r"farmer\.glb: exists already"):
+    with pytest.raises(ExportError, match=r"farmer\.glb: already exists"):
         write(SMALL, tmp_path)
     assert _contents(tmp_path) == {"farmer.glb": b"mine"}
 
@@ -107,7 +107,7 @@ def test_formats_with_the_same_texture_live_side_by_side(tmp_path: Path) -> None
     assert len(_contents(tmp_path)) == 8  # four, their .bin and .mtl, a texture of each level
 
 
-def test_the_drawing_beside_the_output_is_never_touched(tmp_path: Path) -> None:
+def test_the_drawing_next_to_the_output_is_never_changed(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"the drawing")
     for suffix in FORMATS:
         write(SMALL, tmp_path / f"a{suffix}", overwrite=True)
@@ -126,7 +126,7 @@ def test_permissions_follow_the_umask(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a.fbx", "a.stl", "a.png", "a.b3dm"])
 def test_unknown_suffixes_are_refused_with_the_known_ones(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ExportError, match=r"unknown suffix \.\w+; use \.glb, .* or a folder"):
+    with pytest.raises(ExportError, match=r"unknown suffix '\.\w+'; use \.glb, .* or a folder"):
         check_outputs([tmp_path / name])
 
 
@@ -135,21 +135,21 @@ def test_suffixes_in_capitals_are_known(tmp_path: Path) -> None:
         write(SMALL, tmp_path / f"{suffix[1:]}{suffix.upper()}")
 
 
-def test_check_finds_what_stands_in_the_way(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_obstacles_are_reported_before_writing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     check_outputs([tmp_path / "not" / "yet" / "a.glb", tmp_path / "not"])
     with pytest.raises(InputError, match="twice"):
         check_outputs([tmp_path / "a.glb", f"{tmp_path}/./a.glb"])
     (tmp_path / "a_texture.png").write_bytes(b"")
-    with pytest.raises(ExportError, match=r"a_texture\.png: exists already and belongs to a\.gltf"):
+    with pytest.raises(ExportError, match=r"a_texture\.png: already exists, a part of a\.gltf"):
         check_outputs([tmp_path / "a.gltf"])
     check_outputs([tmp_path / "a.gltf"], overwrite=True)
-    with pytest.raises(ExportError, match="is not a folder"):
+    with pytest.raises(ExportError, match="is not a directory"):
         check_outputs([tmp_path / "a_texture.png" / "b.glb"])
     (tmp_path / "folder.glb").mkdir()
-    with pytest.raises(ExportError, match="is a folder"):
+    with pytest.raises(ExportError, match="a directory, not a file"):
         check_outputs([tmp_path / "folder.glb"], overwrite=True)
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write anywhere
-    with pytest.raises(ExportError, match="no permission to write"):
+    with pytest.raises(ExportError, match="no permission to write to"):
         check_outputs([tmp_path / "b.glb"])
 
 

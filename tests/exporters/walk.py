@@ -13,7 +13,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Met:
+class VisitedContent:
     """A content: its uri, the tile, ECEF from TILE, boxes above it in ECEF (centre, axes), errors above, depth."""
 
     uri: str
@@ -24,7 +24,7 @@ class Met:
     depth: int
 
 
-def contents(documents: dict[str, Any] | Path, name: str = "tileset.json") -> Iterator[Met]:
+def contents(documents: dict[str, Any] | Path, name: str = "tileset.json") -> Iterator[VisitedContent]:
     """Contents that are no tilesets; documents : file name → document, or the folder they are in."""
     if isinstance(documents, Path):
         folder = documents
@@ -39,7 +39,7 @@ def contents(documents: dict[str, Any] | Path, name: str = "tileset.json") -> It
 
 def _walk(
     tile: dict[str, Any], read: Callable[[str], Any], above: np.ndarray, boxes: Any, errors: Any, depth: int
-) -> Iterator[Met]:
+) -> Iterator[VisitedContent]:
     matrix = above @ np.array(tile.get("transform", np.eye(4).T.ravel())).reshape(4, 4).T
     box = np.array(tile["boundingVolume"]["box"])
     centre = matrix[:3, :3] @ box[:3] + matrix[:3, 3]
@@ -51,13 +51,13 @@ def _walk(
             document = read(uri)
             yield from _walk(document["root"], read, matrix, boxes, (*errors, document["geometricError"]), depth)
         else:
-            yield Met(uri, tile, matrix, boxes, errors, depth)
+            yield VisitedContent(uri, tile, matrix, boxes, errors, depth)
     for child in tile.get("children", []):
         yield from _walk(child, read, matrix, boxes, errors, depth + 1)
 
 
 def outside(points: np.ndarray, centre: np.ndarray, axes: np.ndarray) -> float:
-    """How far, in metres, ECEF points reach out of a box of three orthogonal half axes (rows)."""
+    """Largest distance, metres, of ECEF points outside a box of three orthogonal half axes (rows)."""
     length = np.linalg.norm(axes, axis=1)
     along = (points - centre) @ (axes / length[:, None]).T
     return float((np.abs(along) - length).max())

@@ -1,4 +1,4 @@
-"""One finished run of the main job, shared by the tests that look at its outputs."""
+"""One finished run of the main job, shared by the tests that inspect its outputs."""
 
 from __future__ import annotations
 

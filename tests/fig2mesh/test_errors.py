@@ -1,4 +1,4 @@
-"""What the kinds of errors say of themselves."""
+"""Attributes of the kinds of errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KINDS = (InputError, FigureError, OutputError, PlacementError, ExportError)
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_only_an_unusable_figure_fails_again_as_long_as_it_is_the_same(kind: type[InputError]) -> None:
-    assert kind("a", "b", "c").lasting == (kind is FigureError)
+    assert kind("a", "b", "c").permanent == (kind is FigureError)
 
 
 @pytest.mark.parametrize("kind", KINDS)

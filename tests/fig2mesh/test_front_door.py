@@ -1,4 +1,4 @@
-"""What a script imports: names, laziness, and ten lines from a picture to files."""
+"""Public interface for scripts: names, lazy imports, and ten lines from a picture to files."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What the paper's own method fails on (figure 14) is a solid here, seen from the front and from the side.
+"""Failures of the paper's own method (figure 14) are solids here, measured from the front and from the side.
 
-Drawings are made in code, bodies on the road without networks. Depths are compared with what is drawn: the paper gives
-no depths of what it fails on, and a drawing says nothing of them but that a round thing is about as deep as wide.
+Drawings are made in code, bodies without networks. Depths are compared with what is drawn: the paper gives no depths of
+its failures, and all that a drawing shows of depth is that a round thing is about as deep as wide.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SIDES = ("l", "r")
 LEGS = [f"{side}_{joint}" for side in SIDES for joint in ("knee", "ankle", "foot")]
 
 LEAST_DEEP = 0.75
-"""What is drawn as a strip is inflated as deep as wide where it is a limb, 0.74 times where it is cloth."""
+"""Ratio of depth to width of an inflated strip: as deep as wide where it is a limb, 0.74 times where it is cloth."""
 
 
 def whole() -> Sketch:
@@ -412,7 +412,7 @@ def test_a_head_cut_off_by_a_forearm_stays_a_head() -> None:
 
 
 def lowered_by_fillets(figure: Assembled, centre: NDArray[np.float32]) -> NDArray[np.float64]:
-    """How much fillets lower the field within 0.09 units of a point: hands and shoulders are about that large."""
+    """Lowering of the field by fillets within 0.09 units of a point: hands and shoulders are about that large."""
     points = centre.astype(np.float64) + np.random.default_rng(2).uniform(-0.09, 0.09, (6000, 3))
     return np.asarray(Body(figure.outline.parts).evaluate(points)[0] - figure.body.evaluate(points)[0])
 

@@ -155,12 +155,12 @@ def read_stage(path: Path) -> None:
 def read_weights(path: Path) -> None:
     import torch
 
-    from fig2mesh.nets.weights import read_module
+    from fig2mesh.nets.weights import WeightsFile
 
     def make(shape: dict[str, int]) -> torch.nn.Linear:
         return torch.nn.Linear(shape["inputs"] % 1000, shape["outputs"] % 1000)
 
-    read_module(path, make, "linear network")
+    WeightsFile("linear", "linear network", make, lambda shape: shape, lambda shape: "linear").read(path)
 
 
 def read_for_globe(path: Path) -> None:

@@ -29,7 +29,7 @@ from tests.georef.strategies import heights, latitudes, longitudes, placements
 
 # A float64 step at the earth's radius is 9e-10 m; conversions there and back make a handful of them.
 STEP_M = 1e-8
-# The same steps, and the 1.5e-8 m of Karney's geodesics, seen from 1 m away: 2.5e-8 rad. The goal is 0.01 degrees.
+# The same steps, and the 1.5e-8 m of Karney's geodesics, at a distance of 1 m: 2.5e-8 rad. The goal is 0.01 degrees.
 BEARING_DEG = 1.5e-6
 
 
@@ -65,12 +65,12 @@ def test_known_places():
 
 @given(longitudes, latitudes, heights)
 def test_enu_agrees_with_projs_topocentric(lon, lat, height):
-    ours = enu_at(lon, lat, height)
+    own = enu_at(lon, lat, height)
     theirs = pyproj.Transformer.from_pipeline(
         f"+proj=topocentric +ellps=WGS84 +lon_0={lon!r} +lat_0={lat!r} +h_0={height!r}"
     )
     local = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (-30, 200, 7)], np.float64)
-    np.testing.assert_allclose(np.transpose(theirs.transform(*ours.apply(local).T)), local, rtol=0, atol=2 * STEP_M)
+    np.testing.assert_allclose(np.transpose(theirs.transform(*own.apply(local).T)), local, rtol=0, atol=2 * STEP_M)
 
 
 @given(longitudes, latitudes, heights)
@@ -125,7 +125,7 @@ def test_main_directions_are_exact(heading, front, left):
 @given(placements)
 @example(GeoPlacement(13.0, 90.0, 0.0, heading_deg=90.0))
 @example(GeoPlacement(180.0, -90.0, 0.0, heading_deg=33.0))
-def test_the_nose_points_where_the_geodesic_says(placement):
+def test_the_nose_points_along_the_geodesic(placement):
     """Feet and a point 1 m in front of the nose, through geodetic coordinates, independent of our rotations."""
     height = 0.9 * placement.figure_height_m
     feet, ahead = geodetic_from_ecef(ecef_from_asset(placement).apply([(0.0, 0.0, 0.0), (0.0, height, 1.0)]))
@@ -134,7 +134,7 @@ def test_the_nose_points_where_the_geodesic_says(placement):
         ecef_from_geodetic((placement.lon_deg, placement.lat_deg, placement.height_m)),
         atol=STEP_M,
     )
-    # The start is the longitude asked for: on the earth's axis the one read back means nothing.
+    # Starts at the given longitude: on the earth's axis the one read back is undefined.
     azimuth, _, distance = pyproj.Geod(ellps="WGS84").inv(placement.lon_deg, placement.lat_deg, ahead[0], ahead[1])
     # At height h a metre along the meridian shrinks on its way down to the ellipsoid as R / (R + h) with another R
     # than a metre along the parallel: that turns the bearing by up to h/2 times the difference of 1/R, 0.0068 / R.
@@ -190,7 +190,7 @@ def test_shapes_pass_through():
 
 @pytest.mark.parametrize("bad", [(0, 90.1, 0), (0, np.nan, 0), (np.inf, 0, 0)])
 def test_places_that_do_not_exist(bad):
-    with pytest.raises(PlacementError, match="is no place"):
+    with pytest.raises(PlacementError, match="is not on the earth"):
         ecef_from_geodetic([(0, 0, 0), bad])
     with pytest.raises(PlacementError):
         enu_at(*bad)

@@ -98,7 +98,7 @@ def test_nodata_is_an_error(tmp_path):
 
 def test_a_terrain_model_is_not_a_geoid(tmp_path):
     terrain = write_gtx(tmp_path / "dem.gtx", 46.0, 7.0, 1.0, np.full((3, 3), 408.0))
-    with pytest.raises(PlacementError, match="408 m at the place is no height of a geoid"):
+    with pytest.raises(PlacementError, match="408 m at the location is not a plausible geoid height"):
         ellipsoidal_height(8.0, 47.0, 400.0, terrain)
 
 
@@ -125,7 +125,7 @@ def test_other_findings_name_the_datum_and_the_remedy(tmp_path):
         ellipsoidal_height(8.0, 47.0, 400.0, "egm2008")
     text = tmp_path / "grid.txt"
     text.write_text("1 2 3")
-    with pytest.raises(PlacementError, match=r"its suffix is '.txt'; give a geoid grid"):
+    with pytest.raises(PlacementError, match=r"unknown suffix '.txt'; give a geoid grid"):
         grid_path(text)
     comma = tmp_path / "a,b.gtx"
     comma.write_bytes(b"")
@@ -137,9 +137,9 @@ def test_other_findings_name_the_datum_and_the_remedy(tmp_path):
         ellipsoidal_height(47.0, 97.0, 0.0)
 
 
-def test_egm96_without_its_grid_says_so(tmp_path, monkeypatch):
+def test_a_missing_egm96_grid_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(heights, "EGM96_GRID", tmp_path / "egm96_15.tif")
-    with pytest.raises(PlacementError, match=r"--altitude-datum egm96: .*egm96_15\.tif is missing; install"):
+    with pytest.raises(PlacementError, match=r"--altitude-datum egm96: .*egm96_15\.tif is missing; reinstall"):
         ellipsoidal_height(8.5, 47.4, 400.0, "egm96")
 
 
@@ -170,9 +170,9 @@ def test_egm96_at_the_poles_on_every_meridian():
 @pytest.mark.parametrize("lat", [-77.1, -20.0, 0.0, 12.4, 66.6])
 def test_egm96_is_continuous_over_the_antimeridian(lat):
     assert undulation_m(180.0, lat, "egm96") == undulation_m(-180.0, lat, "egm96")
-    beside = [undulation_m(lon, lat, "egm96") for lon in (179.9999, 180.0, -179.9999)]
+    across = [undulation_m(lon, lat, "egm96") for lon in (179.9999, 180.0, -179.9999)]
     # 1e-4 degrees are 11 m, over which no geoid rises by a centimetre.
-    assert np.ptp(beside) < 0.01
+    assert np.ptp(across) < 0.01
 
 
 def test_egm96_in_zurich_and_at_its_extremes():

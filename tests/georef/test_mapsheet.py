@@ -87,7 +87,7 @@ def test_a_sheet_in_degrees_is_stretched(folder: Path) -> None:
     assert spot.up_m == pytest.approx(1114, abs=2)
 
 
-def test_a_mirrored_sheet_is_told(folder: Path) -> None:
+def test_a_mirrored_sheet_is_reported(folder: Path) -> None:
     flipped = matrix() @ np.array([[-1.0, 0, SIZE[0]], [0, 1, 0], [0, 0, 1]])
     spot = read_sheet(given_map(folder, flipped, SWISS)).place(100, 100)
     assert spot.mirrored
@@ -227,26 +227,26 @@ def test_exact_fits_do_not_pass_for_accurate_ones(folder: Path) -> None:
     assert spline.rmse_m < 1e-4
     assert spline.degrees_of_freedom == 0
     assert spline.sigma_m is None
-    assert spline.left_out_rmse_m is not None
-    assert spline.left_out_rmse_m > 20.0, "what a spline misses is at least the noise of its points"
+    assert spline.leave_one_out_rmse_m is not None
+    assert spline.leave_one_out_rmse_m > 20.0, "what a spline misses is at least the noise of its points"
 
 
-def test_points_that_do_not_agree_are_told(folder: Path) -> None:
+def test_inconsistent_points_are_reported(folder: Path) -> None:
     pixels = controls(9)
     shuffled = swiss(pixels)[np.random.default_rng(0).permutation(9)]
     notes = read_sheet(points_file(folder / "map.points", pixels, shuffled)).notes
-    assert "check points and reference system" in notes[0]
+    assert "check the points and the reference system" in notes[0]
     assert read_sheet(points_file(folder / "map.points", pixels, swiss(pixels))).notes == ()
 
 
-def test_outside_the_hull_is_told_with_its_distance(folder: Path) -> None:
+def test_outside_the_hull_the_distance_is_reported(folder: Path) -> None:
     pixels = np.array([[100.0, 100], [200, 100], [200, 200], [100, 200], [150, 150]])
     sheet = read_sheet(points_file(folder / "map.points", pixels, swiss(pixels)))
     assert sheet.place(150, 120).outside_m == 0.0
     assert sheet.place(150, 120).notes == ()
-    beside = sheet.place(240, 150)
-    assert beside.outside_m == pytest.approx(40 * METRES_PX, rel=1e-3)
-    assert "240 150 lies 200 m outside the control points' hull" in beside.notes[0]
+    outside = sheet.place(240, 150)
+    assert outside.outside_m == pytest.approx(40 * METRES_PX, rel=1e-3)
+    assert "240 150 lies 200 m outside the control points' hull" in outside.notes[0]
     assert sheet.place(230, 240).outside_m == pytest.approx(50 * METRES_PX, rel=1e-3), "from a corner"
 
 
@@ -261,14 +261,14 @@ def test_pixels_off_the_sheet_are_refused(folder: Path, x: float, y: float) -> N
 
 
 def test_pixels_that_are_none_are_refused(folder: Path) -> None:
-    with pytest.raises(PlacementError, match="is no pixel"):
+    with pytest.raises(PlacementError, match="is not a pixel"):
         spot_of(folder, float("nan"), 5)
 
 
 def test_places_off_the_earth_are_refused(folder: Path) -> None:
     sheet = read_sheet(given_map(folder, np.array([[0.5, 0, 0.0], [0, -0.5, 100.0]]), "EPSG:4326"))
     assert sheet.place(10, 100).lat_deg == pytest.approx(50)
-    with pytest.raises(PlacementError, match="lies outside the area of WGS 84"):
+    with pytest.raises(PlacementError, match="is outside the area of WGS 84"):
         sheet.place(10, 5)
     wrong = read_sheet(given_map(folder, matrix() * 1000, SWISS))
     with pytest.raises(PlacementError, match=r"check the (reference system|georeference)"):

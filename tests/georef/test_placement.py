@@ -71,7 +71,7 @@ def test_other_facings_name_input_finding_and_remedy(text):
 
 
 def test_the_source_of_a_facing_can_be_named():
-    with pytest.raises(PlacementError, match=r"^people\.csv row 3: 'up' is no direction"):
+    with pytest.raises(PlacementError, match=r"^people\.csv row 3: 'up' is not a direction"):
         parse_facing("up", source="people.csv row 3")
 
 

@@ -1,4 +1,4 @@
-"""What makes a test a hard case: what is given, what holds, how exactly, and why so."""
+"""Metadata of a hard case: the input, the law, the tolerance, and the reason."""
 
 from __future__ import annotations
 

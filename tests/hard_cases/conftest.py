@@ -15,7 +15,7 @@ from tests.hard_cases.figures import Job
 @pytest.fixture(autouse=True)
 def worst(request: pytest.FixtureRequest) -> Iterator[Worst]:
     mark = request.node.get_closest_marker("hard_case")
-    assert mark is not None, "tests in this folder say what they hold: @hard_case(...)"
+    assert mark is not None, "tests in this folder state what they check: @hard_case(...)"
     case: Case = mark.args[0]
     measured = Worst(case)
     yield measured

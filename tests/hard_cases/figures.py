@@ -59,7 +59,14 @@ def solid_of(figure: Figure, pieces: int = 1) -> Assembled:
     canvas = make_canvas(figure, frame, draft.canvas_px, draft.voxel)
     outline = outline_parts(canvas, pose, figure.visible, voxel=draft.voxel)
     body = Body(outline.parts, fillets=outline.fillets)
-    return Assembled(figure, frame, pose, outline, body, make_solid(None, body, draft, pieces).mesh)
+    return Assembled(
+        figure,
+        frame,
+        pose,
+        outline,
+        body,
+        make_solid(None, body, pieces, spacing=draft.spacing, closing=draft.closing).mesh,
+    )
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ ELSEWHERE = (
     ("At a pole the axes follow the longitude exactly", "tests/georef/test_geodesy.py",
      "test_poles_follow_the_longitude_exactly"),
     ("The nose points where the geodesic says, at any place and heading", "tests/georef/test_geodesy.py",
-     "test_the_nose_points_where_the_geodesic_says"),
+     "test_the_nose_points_along_the_geodesic"),
     ("Bearings of any finite number, −1e-20 and −0.0 included", "tests/georef/test_placement.py",
      "test_bearings_are_normalized_once_and_keep_their_direction"),
     ("Geoid grids close at the antimeridian and hold at the poles", "tests/georef/test_heights.py",

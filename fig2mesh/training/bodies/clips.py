@@ -1,7 +1,7 @@
 """Poses for training: frames of motion clips, retargeted, mixed, varied and thinned.
 
-Whole clips are held out before anything else happens, so that no held-out pose owes a limb to a clip that training has
-seen; hand-made stances only train, as long as there are clips to hold out.
+Whole clips are held out before anything else happens, so that no held-out pose shares a limb with a training clip;
+hand-made stances are for training only, as long as there are clips to hold out.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from fig2mesh.training.bodies.retarget import (
     angle_between,
     canonical_joints,
     mirrored,
+    normalise_poses,
     plausible,
     retarget,
-    settle,
 )
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE, PoseSet
 from fig2mesh.training.bodies.stances import stances
@@ -40,7 +40,7 @@ HELD_OUT_SHARE = 0.15
 HELD_OUT_COUNT = 400
 MADE_SHARE, MIXED_SHARE = 0.25, 0.30  # of the training poses; the rest are frames of clips and their mirror images
 NOISE_DEG = 10.0
-GLB_FRAMES, BVH_FRAMES = 14, 40  # a clip; BVH motions go on for seconds, GLB clips for a step or a blow
+GLB_FRAMES, BVH_FRAMES = 14, 40  # per clip; BVH motions last for seconds, GLB clips for a step or a blow
 
 _SKIP = re.compile(r"t-?pose|rest pose|death|experimental|inactive|awaken|spawn|sleeping|lie_|backflip|^roll", re.I)
 """Clips of no stance, of a fall, or of figures that lie about."""
@@ -80,26 +80,26 @@ BONES: tuple[dict[str, str], ...] = (
            "@LeftCollar @LeftShoulder @LeftElbow @LeftWrist @LeftHip @LeftKnee @LeftAnkle"),
 )
 # fmt: on
-"""Skeletons that are read; a file uses the first whose bones it all has."""
+"""Known skeletons; a file uses the first of which it has all bones."""
 
 
 @dataclass(frozen=True)
 class Clip:
-    """Frames of one motion: `name` is "source/clip", `rotations` (N, 20, 3, 3) as `retarget` gives them."""
+    """Frames of one motion; `name` is "source/clip", `rotations` (N, 20, 3, 3) as `retarget` returns them."""
 
     name: str
     rotations: Rotations
 
 
 def read_clips(assets: Path | None) -> list[Clip]:
-    """All sensible clips under a folder, sorted by name; those of `pybullet_data`, where installed, without one."""
+    """Read all usable clips under a folder, sorted by name; those of `pybullet_data`, where installed, without one."""
     if assets is None:
         folder = motion_folder()
         paths = [] if folder is None else sorted(folder.glob("*.txt"))
         clips = [Clip(f"bullet/{path.stem}", read_motion(path, BVH_FRAMES)) for path in paths]
     else:
         if not assets.is_dir():
-            raise FigureError(str(assets), "it is no folder", "name the folder that holds the clips")
+            raise FigureError(str(assets), "not a directory", "name the folder that holds the clips")
         clips = []
         for path in sorted(assets.rglob("*")):
             if path.suffix == ".glb":
@@ -110,13 +110,13 @@ def read_clips(assets: Path | None) -> list[Clip]:
 
 
 def held_out(names: Iterable[str], seed: int = 0) -> frozenset[str]:
-    """The clips kept from training: those `HELD_OUT_SHARE` (at least one of two) whose seeded hash comes first."""
+    """Choose the clips held out of training: the `HELD_OUT_SHARE` (at least one of two) of the lowest seeded hashes."""
     order = sorted(set(names), key=lambda name: hashlib.sha256(f"{seed}:{name}".encode()).digest())
     return frozenset(order[: math.ceil(HELD_OUT_SHARE * len(order))] if len(order) > 1 else ())
 
 
 def collect_poses(assets: Path | None, *, count: int = 3000, seed: int = 0) -> tuple[PoseSet, PoseSet]:
-    """Training poses (at most `count`) and held-out poses (at most 400), all facing +z.
+    """Return training poses (at most `count`) and held-out poses (at most 400), all facing +z.
 
     Without `assets` the clips come from the package `pybullet_data`; without that too, all poses are hand-made.
     """
@@ -126,7 +126,7 @@ def collect_poses(assets: Path | None, *, count: int = 3000, seed: int = 0) -> t
     apart = [clip for clip in clips if clip.name in hidden_clips]
     kept = [clip for clip in clips if clip.name not in hidden_clips]
     names, made = stances(max(count if kept else 2 * count, HELD_OUT_COUNT), rng)
-    names, made = _usable(names, settle(made))
+    names, made = _usable(names, normalise_poses(made))
     if not apart:
         hidden = np.arange(len(names)) % 7 == 0
         held = _thin([(names[hidden], made[hidden])], [HELD_OUT_COUNT])
@@ -168,7 +168,7 @@ def _bvh_clips(path: Path) -> Iterator[Clip]:
 
 
 def _rest(motion: Bvh, bones: NDArray[np.intp]) -> tuple[Rotations, NDArray[np.float64]]:
-    """(20, 3, 3) rotations and (20, 3) positions of the rest pose, or of the frame that stands best where rest is none.
+    """(20, 3, 3) rotations and (20, 3) positions of the rest pose, or of the most upright frame if it is not a stance.
 
     Some files align every bone's offset with its own x axis; at rest their legs then lie along the trunk.
     """
@@ -188,7 +188,7 @@ def _rest(motion: Bvh, bones: NDArray[np.intp]) -> tuple[Rotations, NDArray[np.f
 
 
 def _match(names: tuple[str, ...]) -> NDArray[np.intp] | None:
-    """(20,) bone of each key, None for a skeleton that is not known."""
+    """(20,) bone of each key, None for an unknown skeleton."""
     for bones in BONES:
         if set(bones.values()) <= set(names):
             return np.array([names.index(bones[key]) for key in KEYS])
@@ -211,13 +211,13 @@ def _stack(clips: list[Clip]) -> tuple[NDArray[np.str_], Rotations]:
     names = np.repeat([clip.name for clip in clips], [len(clip.rotations) for clip in clips])
     rotations = np.concatenate([clip.rotations for clip in clips])
     both = np.concatenate([rotations, mirrored(rotations)])
-    return _usable(np.concatenate([names, names]), settle(both))
+    return _usable(np.concatenate([names, names]), normalise_poses(both))
 
 
 def _frames(clips: list[Clip], rng: np.random.Generator) -> tuple[NDArray[np.str_], Rotations]:
-    """Frames as they are, and as many again with noise."""
+    """Frames of clips, and the same frames with noise."""
     names, rotations = _stack(clips)
-    noisy, shaken = _usable(names, settle(_shake(rotations, rng)))
+    noisy, shaken = _usable(names, normalise_poses(_perturbed(rotations, rng)))
     return np.concatenate([names, noisy]), np.concatenate([rotations, shaken])
 
 
@@ -230,18 +230,18 @@ def _mixed(clips: list[Clip], count: int, rng: np.random.Generator) -> tuple[NDA
     result = carry[:, None] @ rotations[upper]
     result[:, list(_LOWER)] = rotations[lower][:, list(_LOWER)]
     shaken = rng.random(len(result)) < 1 / 3
-    result[shaken] = _shake(result[shaken], rng)
+    result[shaken] = _perturbed(result[shaken], rng)
     both = np.array([f"{a}+{b}" for a, b in zip(names[upper], names[lower], strict=True)], str)
-    return _usable(both, settle(result))
+    return _usable(both, normalise_poses(result))
 
 
-def _shake(rotations: Rotations, rng: np.random.Generator) -> Rotations:
+def _perturbed(rotations: Rotations, rng: np.random.Generator) -> Rotations:
     """Random turns of up to `NOISE_DEG` at every joint; knees and elbows only bend, and never backwards."""
     result = rotations.copy()
-    most = np.radians(NOISE_DEG)
+    limit = np.radians(NOISE_DEG)
     for key, index in KEY.items():
         parent, size = KEY_PARENT.get(key), len(rotations)
-        turn = about(rng.normal(size=(size, 3)), rng.uniform(0, most, size) * (1 if key in _FREE else 0.4))
+        turn = about(rng.normal(size=(size, 3)), rng.uniform(0, limit, size) * (1 if key in _FREE else 0.4))
         if parent is None or key.endswith("foot"):  # feet stay as level as they were
             result[:, index] = turn @ rotations[:, index]
             continue
@@ -251,7 +251,7 @@ def _shake(rotations: Rotations, rng: np.random.Generator) -> Rotations:
             axis = np.cross(np.broadcast_to(straight, bent.shape), bent)
             usual = [1.0, 0, 0] if key.endswith("leg") else [0, -1.0 if key.startswith("l") else 1.0, 0]
             axis = np.where(np.linalg.norm(axis, axis=1, keepdims=True) < 0.1, usual, axis)
-            turn = about(axis, np.maximum(rng.uniform(-most, most, size), -angle_between(straight, bent)))
+            turn = about(axis, np.maximum(rng.uniform(-limit, limit, size), -angle_between(straight, bent)))
         result[:, index] = result[:, KEY[parent]] @ turn @ local
     return result
 
@@ -260,18 +260,18 @@ _FREE = frozenset(key for key in KEYS if key.endswith(("arm", "hand", "leg", "he
 
 
 def _thin(pools: list[tuple[NDArray[np.str_], Rotations]], counts: list[int]) -> tuple[NDArray[np.str_], Rotations]:
-    """The most different poses of each pool; what one pool lacks, the last one gives."""
+    """The most different poses of each pool; the last pool makes up for what others lack."""
     names, rotations, owed = [], [], 0
     for (pool_names, pool), count in zip(pools, counts, strict=True):
-        chosen = farthest(canonical_joints(pool).reshape(len(pool), -1), count + owed)
+        chosen = farthest_points(canonical_joints(pool).reshape(len(pool), -1), count + owed)
         owed += count - len(chosen)
         names.append(pool_names[chosen])
         rotations.append(pool[chosen])
     return np.concatenate(names), np.concatenate(rotations)
 
 
-def farthest(points: NDArray[np.floating], count: int) -> NDArray[np.intp]:
-    """(min(count, N),) indices of points (N, D): the most usual one, then always the one farthest from all chosen."""
+def farthest_points(points: NDArray[np.floating], count: int) -> NDArray[np.intp]:
+    """(min(count, N),) indices of points (N, D): the most central one, then always the one farthest from all chosen."""
     points = np.asarray(points, np.float32)
     count = min(count, len(points))
     chosen = np.empty(count, np.intp)

@@ -2,7 +2,7 @@
 
 A garment that lies on the body is a field of offsets over its vertices: the dressed body keeps the topology of the
 bare one, so it stays one closed mesh, splits into the same parts and needs no repair when it moves. What hangs free
-(a skirt) cannot be told this way; it is an extra surface.
+(a skirt) cannot be described this way; it is an extra surface.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from fig2mesh.training.bodies.anny_body import AnnyBodies
 from fig2mesh.training.bodies.obj_groups import read_groups
 
 REACH = {"cloth": 0.07, "shoe": 0.05, "hair": 0.16, "hat": 0.20}
-"""How far from the skin a garment may lie and still be told as an offset, metres on a body of 1.79 m."""
+"""Maximum distance from the skin up to which a garment is an offset, metres on a body of 1.79 m."""
 
 START = 0.025
-"""Garments are fitted to an average body; where they cut into this one, rays must start below the skin."""
+"""Depth below the skin at which rays start, metres: garments fitted to an average body may cut into this one."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def vertex_normals(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -
 def wear(
     vertices: NDArray[np.floating], faces: NDArray[np.integer], garment: Garment, scale: float = 1.0
 ) -> NDArray[np.float64]:
-    """(V, 3) the body with the garment on; scale : of its thickness."""
+    """(V, 3) vertices of the body with the garment on; scale : factor on its thickness."""
     if garment.kind != "cloth":
         return np.asarray(vertices + garment.offset, np.float64)
     normal = vertex_normals(vertices, faces)
@@ -68,7 +68,7 @@ def wear(
 
 
 def read_garments(bodies: AnnyBodies, assets: Path | None) -> tuple[Garment, ...]:
-    """The garments of a folder of MakeHuman assets (`.mhclo` with OBJ), and those that are made here."""
+    """Read the garments of a folder of MakeHuman assets (`.mhclo` with OBJ), and add the generated ones."""
     made = _made(bodies)
     folder = None if assets is None else assets / "makehuman_assets_cc0"
     if folder is None or not folder.is_dir():
@@ -91,7 +91,7 @@ def read_garments(bodies: AnnyBodies, assets: Path | None) -> tuple[Garment, ...
 
 
 def _fit(bodies: AnnyBodies, path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]] | None:
-    """A garment's vertices on the mean body, and its triangles; None where it hangs on helpers that are not kept."""
+    """A garment's vertices on the mean body, and its triangles; None where it is bound to helpers that are not kept."""
     scales, rows = _read_mhclo(path)
     faces, _, _, _ = read_groups(path.with_suffix(".obj"))
     full = bodies.full
@@ -101,7 +101,7 @@ def _fit(bodies: AnnyBodies, path: Path) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def _read_mhclo(path: Path) -> tuple[dict[str, tuple[int, int, float]], NDArray[np.float64]]:
-    """Offset scales, and a binding row a vertex: three body vertices, their weights, the offset."""
+    """Offset scales, and one binding per vertex: three body vertices, their weights, the offset."""
     scales: dict[str, tuple[int, int, float]] = {}
     rows: list[list[float]] = []
     inside = False
@@ -143,10 +143,10 @@ def _as_offsets(
     vertices = bare
     if kind in ("hair", "hat"):
         allowed &= ~_face_region(bodies)
-        # Ears point in all directions; what lies over them does not.
+        # Ears point in all directions; hair and hats over them do not.
         vertices = _smooth_points(bare, body_faces, allowed, 40)
     normal = vertex_normals(vertices, body_faces)
-    # Hair is many layers of cards: what shows is the outermost. Cloth seen from outside might be another limb's.
+    # Hair is many layers of cards, of which the outermost shows. Cloth seen from outside might be another limb's.
     inwards = kind in ("hair", "hat")
     start, way = (REACH[kind], -1.0) if inwards else (-START, 1.0)
     rays = np.concatenate([vertices + start * normal, way * normal], axis=1).astype(np.float32)
@@ -167,7 +167,7 @@ def _as_offsets(
 def _shoe(
     bodies: AnnyBodies, name: str, surface: NDArray[np.float64], faces: NDArray[np.int64], covered: NDArray[np.bool_]
 ) -> Garment:
-    """The foot smoothed until its toes are one, then laid on the shoe."""
+    """The foot, smoothed until its toes are one, then projected onto the shoe."""
     import open3d as o3d
 
     vertices = bodies.rig.vertices.astype(np.float64)
@@ -185,7 +185,7 @@ def _shoe(
 
 
 def _made(bodies: AnnyBodies) -> tuple[Garment, ...]:
-    """Clothes that need no assets: loose and tight sleeves, trousers and shirts of even thickness, plain hair."""
+    """Generated clothes, without assets: loose and tight sleeves, trousers and shirts of even thickness, plain hair."""
     part = _vertex_parts(bodies)
     vertices = bodies.rig.vertices
     torso = part == PART["torso"]
@@ -216,12 +216,12 @@ def _made(bodies: AnnyBodies) -> tuple[Garment, ...]:
 
 
 def _along(thickness: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(V, 3) the offset of a cloth, from its thickness along the normals."""
+    """(V, 3) offset of a cloth from its thickness along the normals."""
     return np.stack([thickness, 0 * thickness, 0 * thickness], axis=1).astype(np.float32)
 
 
 def _face_region(bodies: AnnyBodies) -> NDArray[np.bool_]:
-    """(V,) bool: the face, which hair must leave free; anny's hair often falls over it."""
+    """(V,) bool mask of the face, which hair must leave free; anny's hair often falls over it."""
     at = dict(zip(("head", "eyes"), bodies.rig.joint_rest[:2], strict=True))
     vertices = bodies.rig.vertices
     ahead = vertices[:, 2] > at["head"][2] + 0.25 * (at["eyes"][2] - at["head"][2])
@@ -243,7 +243,7 @@ def _smooth_points(
 def _smooth(
     values: NDArray[np.float64], faces: NDArray[np.integer], where: NDArray[np.bool_], rounds: int
 ) -> NDArray[np.float64]:
-    """Averaged with neighbours, on vertices `where`; the others stay."""
+    """Laplacian smoothing of values on vertices `where`; the others stay."""
     from scipy.sparse import coo_matrix
 
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])

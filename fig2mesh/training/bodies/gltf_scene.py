@@ -1,4 +1,4 @@
-"""Rigs and clips in glTF files: the tree of nodes by name, and animations sampled at a moment.
+"""Rigs and clips in glTF files: the tree of nodes by name, and animations sampled at one time.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#animations ; morph targets are not read.
 """
@@ -56,7 +56,7 @@ class GltfScene:
 
     @cached_property
     def clips(self) -> dict[str, dict[str, Any]]:
-        """Animation of each name, what stands before a "|" (the armature) left out."""
+        """Animation of each name, without the armature before a "|"."""
         return {a.get("name", "").split("|")[-1]: a for a in self.document.get("animations", [])}
 
     def accessor(self, index: int) -> NDArray[np.float64]:
@@ -97,7 +97,9 @@ class GltfScene:
                 if "node" not in target or target["path"] not in _REST:
                     continue
                 times, values = self.accessor(sampler["input"])[:, 0], self.accessor(sampler["output"])
-                if sampler.get("interpolation") == "CUBICSPLINE":  # between tangents; linear steps are near enough
+                if (
+                    sampler.get("interpolation") == "CUBICSPLINE"
+                ):  # values between tangents; linear interpolation is near enough
                     values = values.reshape(len(times), 3, -1)[:, 1]
                 tracks.append((target["node"], target["path"], times, values))
             self._read_tracks[clip] = tracks
@@ -105,7 +107,7 @@ class GltfScene:
 
 
 def read_scene(path: Path) -> GltfScene:
-    """Read one glTF file. Raises ExportError where it is not one."""
+    """Read one glTF file; raises ExportError for any other file."""
     return GltfScene(read_gltf(path))
 
 

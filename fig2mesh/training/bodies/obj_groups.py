@@ -1,4 +1,4 @@
-"""Groups of triangles of an OBJ file, and their connected pieces."""
+"""Groups of triangles of an OBJ file, and their connected components."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def read_groups(
 
 
 def pieces(faces: NDArray[np.integer]) -> NDArray[np.integer]:
-    """(F,) label of the connected piece that each face belongs to."""
+    """(F,) label of the connected component that each face belongs to."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -43,11 +43,11 @@ def pieces(faces: NDArray[np.integer]) -> NDArray[np.integer]:
 
 
 def largest_piece(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Faces of the connected piece that has most of them."""
+    """Faces of the largest connected component."""
     label = pieces(faces)
     return np.asarray(faces[label == np.bincount(label).argmax()])
 
 
 def in_piece(faces: NDArray[np.int64], piece: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(F,) whether each face shares its first vertex with a piece."""
+    """(F,) bool mask of the faces whose first vertex belongs to a component."""
     return np.isin(faces[:, 0], np.unique(piece))

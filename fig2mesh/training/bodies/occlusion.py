@@ -1,4 +1,4 @@
-"""Joints that a body of capsules hides from the viewer."""
+"""Occlusion of joints by a body of capsules."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AVERTED: Final = 0.3
 
 
 def occluded(joints: Tensor, stoutness: Tensor) -> Tensor:
-    """(N, 21) bool: joints that a body of capsules hides from the viewer, and the eyes of averted heads.
+    """(N, 21) bool: joints occluded by a body of capsules, and the eyes of averted heads.
 
     joints : (N, 21, 3), z to the viewer; stoutness : (N,) factor of the capsules' usual radii
     """
@@ -78,4 +78,4 @@ _OWN: Final = tuple(
     )
     for name in JOINT_NAMES
 )
-"""(21, capsules) whether a capsule belongs to a joint and so cannot hide it."""
+"""(21, capsules) True where a capsule belongs to a joint and so cannot occlude it."""

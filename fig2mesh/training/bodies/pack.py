@@ -19,14 +19,14 @@ from fig2mesh.training.bodies.garments import Garment, read_garments
 from fig2mesh.training.bodies.rig import PoseSet, Rig
 
 HELD_OUT_SHARE = 0.22
-"""Share of characters and of outfits that training never sees."""
+"""Share of characters and garments held out of training."""
 
 # fmt: off
-HALF = (
+HALF_PRECISION = (
     "vertices", "shapes", "skirt", "skirt_shapes", "uv", "offset", "bone_weight", "skirt_weight", "rotations", "curl",
 )
 # fmt: on
-"""Fields that are kept in half precision: half a millimetre on a body."""
+"""Fields stored in half precision: half a millimetre on a body."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Character:
 
 @dataclass(frozen=True)
 class Pack:
-    """Everything that samples are made of.
+    """Bodies, garments and poses from which samples are made.
 
-    training_poses, held_out_poses : of clips that the other does not have
+    training_poses, held_out_poses : poses of disjoint sets of clips
     """
 
     anny: AnnyBodies
@@ -52,7 +52,7 @@ class Pack:
 
 
 def held_out(name: str) -> bool:
-    """Whether a character or a garment is kept for validation: by its name, so that more assets move nobody."""
+    """Whether a character or garment is in the validation set: by its name, so that adding assets moves no other."""
     if name.startswith("made-"):
         return False
     digest = hashlib.sha256(name.encode()).digest()
@@ -60,7 +60,7 @@ def held_out(name: str) -> bool:
 
 
 def build_pack(assets: Path | None, seed: int = 0, poses: int = 3000) -> Pack:
-    """Make the pack from anny and, where given, a folder of assets (docs/training.md says which)."""
+    """Make the pack from anny and, where given, a folder of assets (listed in docs/training.md)."""
     from fig2mesh.training.bodies.characters import read_character
     from fig2mesh.training.bodies.clips import collect_poses
 
@@ -88,7 +88,7 @@ def save_pack(pack: Pack, path: Path) -> None:
 
 
 def load_pack(path: Path) -> Pack:
-    """Read what `save_pack` wrote."""
+    """Read a pack written by `save_pack`."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
@@ -105,7 +105,7 @@ def load_pack(path: Path) -> Pack:
         raise FigureError(path, "no such file", "make it with: fig2mesh data pack -o FILE") from None
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         finding = f"not a pack of this version ({error})"
-        raise FigureError(path, finding, "make it anew with: fig2mesh data pack") from None
+        raise FigureError(path, finding, "make it again with: fig2mesh data pack") from None
 
 
 def _store(arrays: dict[str, Any], prefix: str, record: Any) -> None:
@@ -115,7 +115,9 @@ def _store(arrays: dict[str, Any], prefix: str, record: Any) -> None:
         if dataclasses.is_dataclass(value):
             _store(arrays, name, value)
         elif isinstance(value, np.ndarray):
-            arrays[name] = value.astype(np.float16) if field.name in HALF and value.dtype == np.float32 else value
+            arrays[name] = (
+                value.astype(np.float16) if field.name in HALF_PRECISION and value.dtype == np.float32 else value
+            )
         else:
             arrays[name] = np.array(value)
 

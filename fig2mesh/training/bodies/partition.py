@@ -1,6 +1,6 @@
 """A body cut into its 14 closed parts (paper §3).
 
-A rig's faces and skin weights never change, so where it is cut, which borders arise and how they are closed is found
+A rig's faces and skin weights never change, so its cuts, their borders and the caps that close them are computed
 once; posing only moves the vertices.
 """
 
@@ -20,7 +20,7 @@ RINGS = 2
 
 @dataclass(frozen=True)
 class PartTopology:
-    """One closed part: faces into the vertices of the rig followed by one centre a border.
+    """One closed part: faces into the vertices of the rig, followed by one centre per border.
 
     faces : (F, 3) int32
     borders : for each cut, the (N,) indices of its vertices; the mean of them is the centre that closes it
@@ -31,7 +31,7 @@ class PartTopology:
     borders: tuple[NDArray[np.int32], ...]
 
     def solid(self, vertices: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-        """Vertices and faces of the closed part of a posed body, without vertices that it does not use."""
+        """Return vertices and faces of the closed part of a posed body, without unused vertices."""
         centres = [vertices[border].mean(axis=0) for border in self.borders]
         everything = np.concatenate([vertices, np.asarray(centres).reshape(-1, 3)])
         used, inverse = np.unique(self.faces, return_inverse=True)
@@ -39,7 +39,7 @@ class PartTopology:
 
 
 def partition(rig: Rig, rings: int = RINGS) -> tuple[PartTopology, ...]:
-    """The parts of a rig, in the order of their labels; parts that the rig does not have are left out."""
+    """Cut a rig into its parts, in the order of their labels; parts that the rig lacks are left out."""
     count = len(rig.vertices)
     result = []
     for part in BODY_PARTS:
@@ -62,7 +62,7 @@ def partition(rig: Rig, rings: int = RINGS) -> tuple[PartTopology, ...]:
 
 
 def _borders(faces: NDArray[np.int32]) -> list[NDArray[np.int32]]:
-    """The connected borders of an open surface, each as its directed edges (E, 2)."""
+    """Connected boundary loops of an open surface, each as its directed edges (E, 2)."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     size = int(edges.max()) + 1
     forward = edges[:, 0].astype(np.int64) * size + edges[:, 1]

@@ -1,4 +1,4 @@
-"""Rotations of a clip's bones → canonical pose rotations (`rig.KEYS`), and what keeps them a body's.
+"""Rotations of a clip's bones → canonical pose rotations (`rig.KEYS`), and limits that keep poses human.
 
 All arrays of rotations are (N, 20, 3, 3), global, BODY, in the order of `KEYS`.
 """
@@ -30,10 +30,10 @@ TWIST_LIMIT_DEG: dict[str, tuple[str, float]] = {
     "upper_leg": ("hips", 60), "lower_leg": ("upper_leg", 30),
 }
 # fmt: on
-"""Limb → the key it turns against about its own axis, and how far skin lets it."""
+"""Limb → the key against which its twist is measured, and the largest twist that skin allows, degrees."""
 
-LOOK_LIMIT_DEG = 35.0
-"""Angle between the way ahead and the way the head looks; drawn figures seldom show the back of a head."""
+HEAD_TURN_LIMIT_DEG = 35.0
+"""Maximum angle between straight ahead and the gaze; drawn figures seldom show the back of a head."""
 
 # fmt: off
 _SEGMENT: dict[str, tuple[float, float, float]] = {
@@ -44,7 +44,7 @@ _SEGMENT: dict[str, tuple[float, float, float]] = {
 }
 # fmt: on
 _ATTACH = {"upper_leg": (0.052, -0.005, 0.0), "clavicle": (0.0, -0.02, 0.0)}
-"""Where these start, from the start (hips) or the end (spine3) of the key above; all in standing heights."""
+"""Starts of these keys, from the start (hips) or the end (spine3) of the parent key; all in standing heights."""
 
 
 def about(axis: NDArray[np.floating], angle: NDArray[np.floating] | float) -> NDArray[np.float64]:
@@ -64,12 +64,12 @@ def angle_between(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[n
 
 
 def swings(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(..., 3, 3) smallest rotations that take directions `a` to `b` (..., 3), which are not opposite."""
+    """(..., 3, 3) smallest (swing) rotations that take directions `a` to `b` (..., 3), which are not opposite."""
     return about(np.cross(a, b), angle_between(a, b))
 
 
 def twists(rotations: NDArray[np.floating], axis: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(...,) radians that `rotations` (..., 3, 3) turn about the unit `axis` (3,); 0 where that is undefined."""
+    """(...,) twist of `rotations` (..., 3, 3) about the unit `axis` (3,), radians; 0 where that is undefined."""
     m = rotations
     odd = np.stack([m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]], -1) @ axis
     even = 1 + np.trace(m, axis1=-2, axis2=-1)
@@ -77,7 +77,7 @@ def twists(rotations: NDArray[np.floating], axis: NDArray[np.floating]) -> NDArr
 
 
 def body_axes(rest_positions: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(3, 3) rotation from a clip's axes to BODY, from where its bones (20, 3) are in an upright stance."""
+    """(3, 3) rotation from a clip's axes to BODY, from the positions (20, 3) of its bones in an upright stance."""
     at = {key: rest_positions[index] for key, index in KEY.items()}
     up = at["head"] - (at["l_foot"] + at["r_foot"]) / 2
     up = np.eye(3)[np.abs(up).argmax()] * np.sign(up[np.abs(up).argmax()])
@@ -88,7 +88,7 @@ def body_axes(rest_positions: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def retarget(rest: Rotations, rest_positions: NDArray[np.floating], frames: Rotations) -> Rotations:
-    """Canonical rotations of a clip's frames.
+    """Return the canonical rotations of a clip's frames.
 
     rest, rest_positions : (20, 3, 3) and (20, 3), the bones in an upright stance with feet ahead, the clip's axes
     frames : (N, 20, 3, 3) global rotations of the same bones
@@ -107,7 +107,7 @@ def retarget(rest: Rotations, rest_positions: NDArray[np.floating], frames: Rota
 
 
 def canonical_joints(rotations: NDArray[np.floating]) -> NDArray[np.float64]:
-    """(N, 20, 3) where the segment of each key ends on a body of standing height 1, BODY with the pelvis at 0.
+    """(N, 20, 3) end of the segment of each key on a body of standing height 1, BODY with the pelvis at 0.
 
     "l_clavicle" gives the shoulder, "l_upper_arm" the elbow, "l_foot" the toes, "head" the crown.
     """
@@ -124,13 +124,13 @@ def canonical_joints(rotations: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def mirrored(rotations: NDArray[np.floating]) -> Rotations:
-    """The same poses with left and right exchanged."""
+    """Return the poses with left and right exchanged."""
     flip = np.diag([-1.0, 1.0, 1.0])
     return np.asarray(flip @ rotations[:, list(KEY_MIRROR)] @ flip)
 
 
 def face_front(rotations: NDArray[np.floating]) -> Rotations:
-    """The same poses turned about y until hips and shoulders together face +z."""
+    """Turn poses about y until hips and shoulders together face +z."""
     joints = canonical_joints(rotations)
     shoulders = joints[:, KEY["l_clavicle"]] - joints[:, KEY["r_clavicle"]]
     hips = rotations[:, KEY["hips"], :, 0]
@@ -139,33 +139,33 @@ def face_front(rotations: NDArray[np.floating]) -> Rotations:
     return np.asarray(turn[:, None] @ rotations)
 
 
-def look_ahead(rotations: NDArray[np.floating]) -> Rotations:
-    """The same poses with heads turned back until they look at most `LOOK_LIMIT_DEG` off +z; necks go half the way."""
+def limit_head_turn(rotations: NDArray[np.floating]) -> Rotations:
+    """Turn heads back until they face at most `HEAD_TURN_LIMIT_DEG` off +z; necks turn half as far."""
     result = np.array(rotations, np.float64)
     look, ahead = result[:, KEY["head"], :, 2], np.array([0.0, 0.0, 1.0])
-    excess = np.maximum(angle_between(look, ahead) - np.radians(LOOK_LIMIT_DEG), 0.0)
+    excess = np.maximum(angle_between(look, ahead) - np.radians(HEAD_TURN_LIMIT_DEG), 0.0)
     axis = np.cross(look, ahead)
     result[:, KEY["neck"]] = about(axis, excess / 2) @ result[:, KEY["neck"]]
     result[:, KEY["head"]] = about(axis, excess) @ result[:, KEY["head"]]
     return result
 
 
-def unwring(rotations: NDArray[np.floating]) -> Rotations:
-    """The same poses with each limb's twist within `TWIST_LIMIT_DEG`; directions stay."""
+def limit_twist(rotations: NDArray[np.floating]) -> Rotations:
+    """Clamp the twist of each limb to `TWIST_LIMIT_DEG`; directions stay."""
     result = np.array(rotations, np.float64)
     for side in "lr":
-        for name, (above, most) in TWIST_LIMIT_DEG.items():
+        for name, (above, limit) in TWIST_LIMIT_DEG.items():
             key, axis = KEY[f"{side}_{name}"], T_POSE[KEY[f"{side}_{name}"]]
             parent = result[:, KEY[above if above == "hips" else f"{side}_{above}"]]
             twist = twists(np.swapaxes(parent, -1, -2) @ result[:, key], axis)
-            change = np.clip(twist, -np.radians(most), np.radians(most)) - twist
+            change = np.clip(twist, -np.radians(limit), np.radians(limit)) - twist
             result[:, key] = result[:, key] @ about(np.broadcast_to(axis, (len(change), 3)), change)
     return result
 
 
-def settle(rotations: NDArray[np.floating]) -> Rotations:
-    """Poses that face the front, look ahead and do not wring their limbs."""
-    return unwring(look_ahead(face_front(rotations)))
+def normalise_poses(rotations: NDArray[np.floating]) -> Rotations:
+    """Make poses face the front, look ahead and keep within the twist limits."""
+    return limit_twist(limit_head_turn(face_front(rotations)))
 
 
 def plausible(rotations: NDArray[np.floating]) -> NDArray[np.bool_]:

@@ -1,9 +1,9 @@
 """Skinned bodies and poses that fit all of them.
 
 Frame BODY: metres, x to the figure's left, y up, z to its front; axes and handedness are those of FIGURE for a figure
-that faces the viewer. A pose holds one rotation a key (`KEYS`), global, from the canonical T-pose: arms along ±x, legs
-down, face and feet to +z. A rig adds the smallest rotation from its own rest limb to the canonical one, so that one
-pose fits bodies with any rest stance.
+that faces the viewer. A pose holds one rotation per key (`KEYS`), global, from the canonical T-pose: arms along ±x,
+legs down, face and feet to +z. A rig adds the smallest rotation from its own rest limb to the canonical one, so that
+one pose fits bodies with any rest stance.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ KEYS: tuple[str, ...] = (
     "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg", "l_foot", "r_foot",
 )
 # fmt: on
-"""The segments that a pose turns; every rig maps each to one of its bones."""
+"""Segments that a pose turns; every rig maps each to one of its bones."""
 
 KEY: dict[str, int] = {name: index for index, name in enumerate(KEYS)}
 
@@ -39,7 +39,7 @@ KEY_PARENT: dict[str, str] = {
     "l_clavicle": "spine3", "r_clavicle": "spine3", "l_upper_leg": "hips", "r_upper_leg": "hips",
 }
 # fmt: on
-"""Key → the key that it hangs on; "hips" hangs on nothing."""
+"""Key → its parent key; "hips" has none."""
 
 # fmt: off
 T_POSE: NDArray[np.float64] = np.array([
@@ -52,7 +52,7 @@ T_POSE: NDArray[np.float64] = np.array([
 
 @dataclass(frozen=True)
 class PoseSet(_Checked):
-    """Poses, each a row.
+    """Poses, one per row.
 
     clip : (N,) str, "source/clip" that the pose comes from; recombined poses name both, "a+b"
     rotations : (N, 20, 3, 3) float32, BODY: a limb of key k points along rotations[k] @ T_POSE[k]
@@ -79,16 +79,16 @@ class Rig(_Checked):
     faces : (F, 3) int32, counter-clockwise from outside; a closed manifold
     face_part : (F,) uint8, `PART_NAMES` 1-14
     face_material : (F,) uint8, index into `materials`
-    materials : names that tell what a face is made of: "skin", "hair", "hat", "shoe", "eye" or "cloth.<piece>"
+    materials : names of materials: "skin", "hair", "hat", "shoe", "eye" or "cloth.<piece>"
     bone_index : (V, 4) int32; bone_weight : (V, 4) float32, rows sum to 1
     parents : (B,) int32, parents come before their children, -1 for a root
-    heads : (B, 3) float32, BODY, where each bone starts at rest
+    heads : (B, 3) float32, BODY, start of each bone at rest
     key_bone : (20,) int32, bone of each of `KEYS`
     rest_direction : (20, 3) float32, BODY, unit direction of each limb at rest, zero where `T_POSE` is zero
     finger_axis : (B, 3) float32, unit axis about which a finger bone curls (right-handed, positive closes the hand);
         zero for bones that are no fingers
     joint_bone : (21,) int32, the bone on which each of `JOINT_NAMES` sits
-    joint_rest : (21, 3) float32, BODY, where it sits at rest
+    joint_rest : (21, 3) float32, BODY, its position at rest
     """
 
     name: str
@@ -169,8 +169,8 @@ def bone_rotations(rig: Rig, rotations: NDArray[np.floating], curl: NDArray[np.f
 
 
 @dataclass(frozen=True)
-class Posture:
-    """Where each bone went: x → rotations[b] @ x + shifts[b], BODY."""
+class BoneTransforms:
+    """Rigid or linear transform of each bone: x → rotations[b] @ x + shifts[b], BODY."""
 
     rotations: NDArray[np.float64]
     shifts: NDArray[np.float64]
@@ -178,28 +178,28 @@ class Posture:
     def skin(
         self, points: NDArray[np.floating], index: NDArray[np.integer], weight: NDArray[np.floating]
     ) -> NDArray[np.float64]:
-        """(N, 3) points of the rest pose carried along by linear blend skinning; index, weight : (N, 4)."""
+        """(N, 3) points of the rest pose deformed by linear blend skinning; index, weight : (N, 4)."""
         flat = np.concatenate([self.rotations.reshape(-1, 9), self.shifts], axis=1)
         blend = np.einsum("vk,vkc->vc", weight, flat[index])
         return np.asarray(np.einsum("vij,vj->vi", blend[:, :9].reshape(-1, 3, 3), points) + blend[:, 9:])
 
 
-def posture(rig: Rig, rotations: NDArray[np.floating], curl: NDArray[np.floating]) -> Posture:
-    """The bones of a rig in a pose: rotations (20, 3, 3) and curl (2,) of a `PoseSet` row; the hips' bone stays."""
+def bone_transforms(rig: Rig, rotations: NDArray[np.floating], curl: NDArray[np.floating]) -> BoneTransforms:
+    """Transforms of the bones of a rig in a pose, rotations (20, 3, 3) and curl (2,) of a `PoseSet` row; hips stay."""
     turned = bone_rotations(rig, rotations, curl)
     heads = rig.heads.astype(np.float64)
     moved = heads.copy()
     for bone, parent in enumerate(rig.parents):
         if parent >= 0:
             moved[bone] = moved[parent] + turned[parent] @ (heads[bone] - heads[parent])
-    return Posture(turned, moved - np.einsum("bij,bj->bi", turned, heads))
+    return BoneTransforms(turned, moved - np.einsum("bij,bj->bi", turned, heads))
 
 
 def pose(
     rig: Rig, rotations: NDArray[np.floating], curl: NDArray[np.floating]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(V, 3) posed vertices and (21, 3) posed joints, BODY."""
-    bones = posture(rig, rotations, curl)
+    bones = bone_transforms(rig, rotations, curl)
     vertices = bones.skin(rig.vertices, rig.bone_index, rig.bone_weight)
     joints = np.einsum("jik,jk->ji", bones.rotations[rig.joint_bone], rig.joint_rest)
     return vertices, joints + bones.shifts[rig.joint_bone]

@@ -1,4 +1,4 @@
-"""Posed skeletons by the thousand: joints of any pose on any body, and how a draughtsman would have put them.
+"""Batches of posed skeletons: joints of any pose on any body, in space and as a drawing has them.
 
 A joint is a sum over the keys between it and the hips: `base + sum_k rotations[k] @ reach[k]`, so that one batched
 product gives the joints of all samples, and a longer limb is a longer `reach`.
@@ -31,16 +31,16 @@ LIMBS: Final = tuple(key for key in KEYS if key.endswith(("arm", "leg", "hand", 
 
 
 @dataclass(frozen=True)
-class View:
-    """How samples are looked at and drawn.
+class ViewSampling:
+    """Distribution of the views and of the errors of drawing that samples have.
 
     front_share : share of samples seen within 60 degrees of the front, the others from all around
     sides : only the four sides of the paper
     tilt_deg : largest pitch and roll
     disproportion : share of samples with other limbs, head and torso than the body has
     jitter : a sample's joints are off by up to this share of the height (one sigma)
-    hidden : share of joints that something (cloth, a bag) hides, besides those behind other parts of the body
-    guess : sigma of the place of hidden joints, share of the height
+    hidden : share of joints that something (cloth, a bag) hides, in addition to those behind other parts of the body
+    guess : sigma of the position of hidden joints, share of the height
     perspective : a camera 3 to 8 m away at the height of the pelvis, instead of an orthographic one
     """
 
@@ -54,16 +54,16 @@ class View:
     perspective: bool = False
 
 
-AROUND: Final = View()
-SIDES: Final = View(sides=True)
-DRAWN: Final = View(front_share=0.7, tilt_deg=15.0, disproportion=0.85, jitter=0.02, hidden=0.06)
+AROUND: Final = ViewSampling()
+SIDES: Final = ViewSampling(sides=True)
+DRAWN: Final = ViewSampling(front_share=0.7, tilt_deg=15.0, disproportion=0.85, jitter=0.02, hidden=0.06)
 
 
 class Sample(NamedTuple):
     """Joints of N figures.
 
     joints : (N, 21, 3) float32, FIGURE units, view axes, origin at the pelvis joint
-    drawn : (N, 21, 2) float32, FIGURE units: where the drawing has them
+    drawn : (N, 21, 2) float32, FIGURE units: positions in the drawing
     visible : (N, 21) bool
     """
 
@@ -77,7 +77,7 @@ class Skeletons(_Checked):
     """Poses and bodies; every pose fits every body.
 
     rotations : (P, 20, 3, 3) float32, BODY, as in `PoseSet`
-    base : (K, 21, 3) float32, BODY metres: what no key turns
+    base : (K, 21, 3) float32, BODY metres: the offset that no key turns
     reach : (K, 21, 20, 3) float32, metres, in the axes of the canonical T-pose
     height : (K,) float32, metres from sole to crown at rest
     """
@@ -96,7 +96,7 @@ class Skeletons(_Checked):
 
     @classmethod
     def from_rigs(cls, rigs: Sequence[Rig], poses: PoseSet) -> Skeletons:
-        """The skeletons of rigs; joints are those of `rig.pose` with straight fingers."""
+        """Return the skeletons of rigs; joints are those of `rig.pose` with straight fingers."""
         parts = [_reach(rig) for rig in rigs]
         return cls(
             rotations=poses.rotations,
@@ -113,7 +113,7 @@ class Skeletons(_Checked):
 
 
 class Sampler:
-    """Random samples of skeletons, made on a device."""
+    """Generator of random samples of skeletons on a device."""
 
     def __init__(self, skeletons: Skeletons, device: torch.device | str = "cpu") -> None:
         self.device = torch.device(device)
@@ -123,8 +123,8 @@ class Sampler:
         self.base = torch.tensor(skeletons.base * scale[:, None, None], device=self.device)
         self.reach = torch.tensor(reach, device=self.device)
 
-    def draw(self, count: int, view: View, generator: torch.Generator) -> Sample:
-        """`count` samples; standing height 1.79 FIGURE units, whatever the proportions."""
+    def draw(self, count: int, view: ViewSampling, generator: torch.Generator) -> Sample:
+        """Draw `count` samples; standing height 1.79 FIGURE units, whatever the proportions."""
 
         def uniform(*shape: int) -> Tensor:
             return torch.rand(shape, generator=generator).to(self.device)
@@ -151,7 +151,7 @@ class Sampler:
         if view.hidden:
             stoutness = torch.exp(0.5 * (uniform(count) - 0.3))
             visible = ~occluded(joints, stoutness) & (uniform(count, len(JOINT_NAMES)) >= view.hidden)
-            # Of many a drawn head there is no face to be seen, although it is turned to the viewer.
+            # Many drawn heads have no face, although they are turned to the viewer.
             visible[:, EYES] &= uniform(count) >= FACELESS
             for side in "lr":
                 # An arm behind the back hides as a whole.
@@ -203,7 +203,7 @@ def _forward(rotations: Tensor, reach: Tensor) -> Tensor:
     return reach.reshape(count, len(JOINT_NAMES), -1) @ flat
 
 
-def _turns(view: View, count: int, uniform) -> Tensor:  # type: ignore[no-untyped-def]
+def _turns(view: ViewSampling, count: int, uniform) -> Tensor:  # type: ignore[no-untyped-def]
     """(N, 3, 3) view from body: yaw, then pitch, then roll."""
     amount = uniform(count, 4)
     if view.sides:
@@ -236,7 +236,7 @@ _TORSO: Final = tuple(KEY[key] for key in KEYS if key not in _CHANGE)
 
 
 def _disproportioned(reach: Tensor, base: Tensor, share: float, uniform, normal):  # type: ignore[no-untyped-def]
-    """Reach and base with other lengths, both sides nearly alike, scaled so that the standing height stays."""
+    """Return reach and base with other lengths, both sides nearly alike, scaled so that the standing height stays."""
     count, device = len(reach), reach.device
     low = torch.tensor([math.log(_CHANGE.get(key, (1.0, 1.0))[0]) for key in KEYS], device=device)
     high = torch.tensor([math.log(_CHANGE.get(key, (1.0, 1.0))[1]) for key in KEYS], device=device)

@@ -1,7 +1,7 @@
-"""A closed mesh round a triangle soup: pieces that overlap, are open where they meet, or are mere sheets.
+"""A closed mesh around a triangle soup: pieces that overlap, are open where they meet, or are mere sheets.
 
-The generalised winding number of all triangles tells inside from outside on a grid, the distance to them gives the
-surface its place, sheets get a thickness.
+On a grid, the generalised winding number of all triangles decides between inside and outside, and the distance to them
+locates the surface; sheets get a thickness.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fig2mesh.mesh.isosurface import extract
 from fig2mesh.records import Mesh
 
 THIN: tuple[tuple[float, float], ...] = ((0.5, 0.75), (1.2, 0.35))
-"""Thickness, and what is put on triangles of pieces thinner than that, in voxels: the grid's nodes would miss some."""
+"""Thickness, and offset of triangles of pieces thinner than that, in voxels: the grid's nodes would miss some."""
 
 REACH = 2.5
 """Voxels from the triangles within which distances are measured."""
@@ -26,19 +26,19 @@ STEEP = 8.0
 """Voxels of distance that one unit of winding number stands for where no triangle is near, as under a skirt."""
 
 BLOCKS = (4, 2, 1)
-"""Edges of the blocks of nodes that are asked for their winding number, coarse to fine."""
+"""Edges of the blocks of nodes for which winding numbers are computed, coarse to fine."""
 
 DECIDED = 0.35
 """Winding numbers this far from one half are far from a surface, too."""
 
-CRUMB = 27
-"""Loose pieces of fewer voxels are dropped, larger ones are tied to the body."""
+MIN_PIECE_VOXELS = 27
+"""Minimum size of loose pieces: smaller ones are dropped, larger ones connected to the body."""
 
 CLUSTER, LARGER = 0.03, 6
 """Edge of the cells whose triangles count as one dipole from afar, FIGURE units, and of larger cells in such cells."""
 
 FAR = 2.5
-"""Radii from which a cluster counts as a dipole: winding numbers were wrong by 0.08 at most."""
+"""Distance in radii from which a cluster counts as a dipole: winding numbers were wrong by 0.08 at most."""
 
 
 class Clusters(NamedTuple):
@@ -68,7 +68,7 @@ def _clusters(owner: NDArray[np.int64], corners: NDArray[np.float64], start: NDA
 
 @helper
 def _far(clusters: Clusters, c: int, x: float, y: float, z: float) -> tuple[bool, float]:
-    """Whether a point is far from a cluster, and the solid angle of its dipole if so."""
+    """Return whether a point is far from a cluster and, if so, the solid angle of its dipole."""
     dx, dy, dz = clusters.middle[c, 0] - x, clusters.middle[c, 1] - y, clusters.middle[c, 2] - z
     square = dx * dx + dy * dy + dz * dz
     if square <= (FAR * clusters.radius[c]) ** 2:
@@ -140,14 +140,14 @@ class Winding:
         return np.asarray(_winding(points, self.corners, self.small, self.large))
 
 
-class Surface:
-    """The triangles of a soup (F, 3, 3), to measure distances to."""
+class SoupSurface:
+    """Triangles of a soup (F, 3, 3), for distance queries."""
 
     def __init__(self, corners: NDArray[np.float64]) -> None:
         import open3d
 
         self.scene: Any = open3d.t.geometry.RaycastingScene(nthreads=1)
-        # Typed loosely: its stub asks for arguments that have defaults.
+        # Typed loosely: its stub requires arguments that have defaults.
         self.tensor = cast(Any, open3d.core.Tensor)
         index = np.arange(3 * len(corners), dtype=np.uint32).reshape(-1, 3)
         self.scene.add_triangles(self.tensor(corners.reshape(-1, 3).astype(np.float32)), self.tensor(index))
@@ -166,22 +166,22 @@ class Surface:
 
 
 def solidify(corners: NDArray[np.float64], voxel: float) -> tuple[Mesh, NDArray[np.bool_]]:
-    """One closed mesh round a triangle soup (F, 3, 3), and (F,) which triangles can be seen from outside it."""
+    """Return one closed mesh around a triangle soup (F, 3, 3), and (F,) bool: triangles visible from outside it."""
     winding = Winding(corners)
     thin, visible = _sides(corners, winding, voxel)
     low = corners.min(axis=(0, 1)) - 4 * voxel
     shape = np.ceil((corners.max(axis=(0, 1)) + 4 * voxel - low) / voxel).astype(int) // 4 * 4 + 4
-    surface = Surface(corners)
+    surface = SoupSurface(corners)
     number, close = _numbers(winding, surface, low, shape, voxel)
     nodes = low + voxel * np.argwhere(close)
     reach = np.full(shape, REACH * voxel)
     reach[close] = np.minimum(reach[close], surface.distance(nodes))
-    # At a triangle the number jumps by one and the distance rules; across open rims it changes gently and rules itself.
+    # At a triangle the number jumps by one and the distance decides; across open rims it changes slowly and decides.
     slope = STEEP * voxel * (0.5 - number)
     values = np.sign(slope) * np.minimum(np.abs(slope), reach)
     for (_, cover), chosen in zip(THIN, thin, strict=True):
         if chosen.any():
-            coat = Surface(corners[chosen]).distance(nodes) - cover * voxel
+            coat = SoupSurface(corners[chosen]).distance(nodes) - cover * voxel
             values[close] = np.minimum(values[close], coat)
     field = _one_piece(values, voxel)
     grid = Grid(field.astype(np.float32), np.ones(shape, bool), _outside(field), low, voxel)
@@ -189,36 +189,36 @@ def solidify(corners: NDArray[np.float64], voxel: float) -> tuple[Mesh, NDArray[
 
 
 def _numbers(
-    winding: Winding, surface: Surface, low: NDArray[np.float64], shape: NDArray[np.int64], voxel: float
+    winding: Winding, surface: SoupSurface, low: NDArray[np.float64], shape: NDArray[np.int64], voxel: float
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Winding number of each node of a grid, and which nodes may have a triangle within reach."""
+    """Winding number of each node of a grid, and bool: nodes that may have a triangle within reach."""
     number, close = np.zeros(shape), np.ones(shape, bool)
-    asked = np.ones(shape // BLOCKS[0], bool)
+    undecided = np.ones(shape // BLOCKS[0], bool)
     for edge in BLOCKS:
-        at = np.argwhere(asked)
+        at = np.argwhere(undecided)
         middles = low + voxel * (edge * at + (edge - 1) / 2)
         level, distance = winding(middles), surface.distance(middles) / voxel
         half = (edge - 1) / 2 * 3**0.5
-        values = np.zeros(asked.shape)
-        values[asked] = level
-        number = np.where(_spread(asked, edge), _spread(values, edge), number)
+        values = np.zeros(undecided.shape)
+        values[undecided] = level
+        number = np.where(_spread(undecided, edge), _spread(values, edge), number)
         if edge == BLOCKS[0]:
-            close = _spread((distance < REACH + half).reshape(asked.shape), edge)
+            close = _spread((distance < REACH + half).reshape(undecided.shape), edge)
         # Away from triangles the number is smooth: where it is decided in the middle of a block, it is in all of it.
-        asked[asked] = (distance < 1 + half) | (np.abs(level - 0.5) < DECIDED)
-        asked = _spread(asked, 2)
+        undecided[undecided] = (distance < 1 + half) | (np.abs(level - 0.5) < DECIDED)
+        undecided = _spread(undecided, 2)
     return number, close
 
 
 def _spread(blocks: NDArray[Any], edge: int) -> NDArray[Any]:
-    """Every value `edge` times along each of the three axes."""
+    """Repeat every value `edge` times along each of the three axes."""
     return blocks.repeat(edge, 0).repeat(edge, 1).repeat(edge, 2)
 
 
 def _sides(
     corners: NDArray[np.float64], winding: Winding, voxel: float
 ) -> tuple[list[NDArray[np.bool_]], NDArray[np.bool_]]:
-    """For each of `THIN` (F,) which triangles have the far side that near, and (F,) which show on the outside."""
+    """For each of `THIN` (F,) bool: triangles whose far side is that near; and (F,) bool: triangles visible outside."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     spread = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
@@ -234,7 +234,7 @@ def _sides(
 
 
 def _one_piece(field: NDArray[np.float64], voxel: float) -> NDArray[np.float64]:
-    """The field with crumbs dropped and larger loose pieces tied to the greatest one by short rods."""
+    """Drop small loose pieces of the field and connect larger ones to the largest by short rods."""
     from scipy.ndimage import label
     from scipy.spatial import cKDTree
 
@@ -243,12 +243,12 @@ def _one_piece(field: NDArray[np.float64], voxel: float) -> NDArray[np.float64]:
         pieces, count = label(field < 0)
         sizes = np.bincount(pieces.reshape(-1), minlength=count + 1)
         sizes[0] = 0
-        field = np.where((sizes < CRUMB)[pieces] & (field < 0), 0.5 * voxel, field)
-        loose = [piece for piece in range(1, count + 1) if CRUMB <= sizes[piece] < sizes.max()]
+        field = np.where((sizes < MIN_PIECE_VOXELS)[pieces] & (field < 0), 0.5 * voxel, field)
+        loose = [piece for piece in range(1, count + 1) if MIN_PIECE_VOXELS <= sizes[piece] < sizes.max()]
         if not loose:
             break
         own = np.argwhere(pieces == loose[0])
-        rest = np.argwhere((pieces > 0) & (pieces != loose[0]) & (sizes >= CRUMB)[pieces])
+        rest = np.argwhere((pieces > 0) & (pieces != loose[0]) & (sizes >= MIN_PIECE_VOXELS)[pieces])
         gap, nearest = cKDTree(rest).query(own)
         a, b = own[gap.argmin()], rest[nearest[gap.argmin()]]
         # Only the rod's own box of nodes changes.
@@ -262,7 +262,7 @@ def _one_piece(field: NDArray[np.float64], voxel: float) -> NDArray[np.float64]:
 
 
 def _outside(field: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Nodes connected with the space round the body."""
+    """Nodes connected with the space around the body."""
     from scipy.ndimage import label
 
     spaces, _ = label(field > 0)

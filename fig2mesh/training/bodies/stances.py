@@ -1,6 +1,6 @@
-"""Stances that drawings love and motion clips lack, made from random angles.
+"""Stances that are common in drawings and rare in motion clips, made from random angles.
 
-A stance joins one way to hold each arm with one way to set the legs. Arms are given by the directions of upper and
+A stance combines a pose of each arm with a pose of the legs. Arms are given by the directions of upper and
 lower arm in the trunk's axes, for the left side; right arms and legs are mirrored left ones.
 """
 
@@ -27,7 +27,7 @@ _ARMS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], f
     "lap": ((0.2, -0.9, 0.25), (-0.1, -0.25, 0.95), 0.12),
     "carry": ((0.25, -0.95, 0.1), (0.05, 0.25, 1.0), 0.15),
 }
-"""Way to hold an arm → upper arm, lower arm, spread of both."""
+"""Arm pose → directions of upper and lower arm, standard deviation of both."""
 
 # fmt: off
 _ARM_PAIRS: tuple[tuple[str, str, float], ...] = (
@@ -95,7 +95,7 @@ def _arm(name: str, rng: np.random.Generator) -> dict[str, NDArray[np.float64]]:
     shrug = about(np.array([0.0, 0.0, 1.0]), np.radians(max(0.0, 25 * u[1]) + rng.normal(0, 2)))
     arm = swings(T_POSE[KEY["l_upper_arm"]], u)
     inside = v - (v @ u) * u
-    if np.linalg.norm(inside) > 0.15:  # bent enough that the elbow says how the upper arm is turned
+    if np.linalg.norm(inside) > 0.15:  # bent enough for the elbow to define the twist of the upper arm
         ahead = inside / np.linalg.norm(inside)
         arm = np.stack([u, np.cross(ahead, u), ahead], 1)
     forearm = swings(u, v) @ arm
@@ -104,7 +104,7 @@ def _arm(name: str, rng: np.random.Generator) -> dict[str, NDArray[np.float64]]:
 
 
 def _leg(name: str, first: bool, hips: NDArray[np.float64], rng: np.random.Generator) -> dict[str, NDArray[np.float64]]:
-    """Rotations of a left leg's keys, BODY, under `hips`; `first` tells the two legs of an uneven stance apart.
+    """Rotations of a left leg's keys, BODY, under `hips`; `first` distinguishes the two legs of an uneven stance.
 
     Angles in degrees: raise the thigh ahead, spread it outwards, turn it outwards about itself, bend the knee.
     """

@@ -1,4 +1,4 @@
-"""One dressed, posed body, drawn at random from a pack: the subject of a sample."""
+"""A dressed, posed body sampled at random from a pack: the subject of a sample."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fig2mesh.training.bodies.caricature import caricature, draw_proportions
 from fig2mesh.training.bodies.garments import Garment, wear
 from fig2mesh.training.bodies.pack import Pack, held_out
 from fig2mesh.training.bodies.partition import PartTopology, partition
-from fig2mesh.training.bodies.rig import Posture, Rig, axis_angle, posture
+from fig2mesh.training.bodies.rig import BoneTransforms, Rig, axis_angle, bone_transforms
 
 SPLITS = ("train", "valid-clips", "valid-characters")
 
@@ -28,11 +28,11 @@ class Subject:
 
     rig : at rest, dressed; its `faces`, `face_part`, `face_material` belong to `vertices`
     vertices : (V, 3); joints : (21, 3)
-    parts : how the rig is cut
-    skirt_vertices, skirt_faces : what hangs free of the body; (0, 3) where there is none
-    character, clip : where body and pose come from
+    parts : partition of the rig
+    skirt_vertices, skirt_faces : the skirt, which hangs free of the body; (0, 3) where there is none
+    character, clip : sources of body and pose
     uv : (F, 3, 2) texture coordinates of the faces, zeros where the body has none
-    colours : (materials, 3) sRGB, or None where the draughtsman may choose
+    colours : (materials, 3) sRGB, or None to have them chosen when it is drawn
     """
 
     rig: Rig
@@ -48,7 +48,7 @@ class Subject:
 
 
 def draw_subject(pack: Pack, split: str, seed: int) -> Subject:
-    """The subject number `seed` of a split: "train", "valid-clips" (unseen) or "valid-characters" (unseen people)."""
+    """Sample subject `seed` of a split: "train", "valid-clips" (unseen) or "valid-characters" (unseen people)."""
     if split not in SPLITS:
         raise ValueError(f"split: {split!r}, expected one of {', '.join(SPLITS)}")
     rng = np.random.default_rng([SPLITS.index(split), seed])
@@ -67,7 +67,7 @@ def draw_subject(pack: Pack, split: str, seed: int) -> Subject:
     if skirt is not None:
         skirt = change.skin(skirt, pack.anny.skirt_index, pack.anny.skirt_weight)
     tall = float(np.ptp(rig.vertices[:, 1]))
-    bones = posture(rig, poses.rotations[row], poses.curl[row])
+    bones = bone_transforms(rig, poses.rotations[row], poses.curl[row])
     spin = axis_angle(np.array([0.0, 1, 0]), float(rng.uniform(-TURN, TURN)))
     tilt = axis_angle(np.array([1.0, 0, 0]), float(rng.uniform(-LEAN, LEAN)))
     roll = axis_angle(np.array([0.0, 0, 1]), float(rng.uniform(-LEAN, LEAN)))
@@ -92,12 +92,12 @@ def draw_subject(pack: Pack, split: str, seed: int) -> Subject:
     )
 
 
-def _posed_skirt(anny: AnnyBodies, skirt: NDArray[np.float64], bones: Posture) -> NDArray[np.float64]:
+def _posed_skirt(anny: AnnyBodies, skirt: NDArray[np.float64], bones: BoneTransforms) -> NDArray[np.float64]:
     return bones.skin(skirt, anny.skirt_index, anny.skirt_weight)
 
 
 def _dressed(pack: Pack, unseen: bool, rng: np.random.Generator) -> tuple[Rig, NDArray[np.float64] | None, str]:
-    """An anny body of random shape in random clothes; of unseen people in such as were never trained on."""
+    """An anny body of random shape in random clothes; unseen people wear clothes that are not in training."""
     anny = pack.anny
     rig, amount = random_body(anny, rng)
     worn = _outfit(pack.garments, unseen, rng)
@@ -126,7 +126,7 @@ def _outfit(garments: tuple[Garment, ...], unseen: bool, rng: np.random.Generato
     for kind, share in (("cloth", 0.9), ("shoe", 0.75), ("hair", 0.8), ("hat", 0.1)):
         choice = [g for g in garments if g.kind == kind and (held_out(g.name) == unseen or g.name.startswith("made-"))]
         if unseen:
-            # Unseen people wear what training never saw, where there is any.
+            # Unseen people wear held-out clothes, where there are any.
             choice = [g for g in choice if held_out(g.name)] or choice
         if choice and rng.random() < share:
             chosen.append(choice[int(rng.integers(len(choice)))])
@@ -140,7 +140,7 @@ _CUTS: dict[str, tuple[PartTopology, ...]] = {}
 
 
 def _parts(rig: Rig) -> tuple[PartTopology, ...]:
-    """Cuts of a rig, kept by name: shape, clothes and pose change none of them."""
+    """Partition of a rig, cached by name: shape, clothes and pose do not change it."""
     if rig.name not in _CUTS:
         _CUTS[rig.name] = partition(rig)
     return _CUTS[rig.name]

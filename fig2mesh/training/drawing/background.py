@@ -1,4 +1,4 @@
-"""What a figure is drawn on: white, tinted or stained paper, and maps."""
+"""Backgrounds of drawn figures: white, tinted or stained paper, and maps."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.training.drawing.marks import LETTERS, Picture, blur, lay, noise, stroke, write
+from fig2mesh.training.drawing.marks import LETTERS, FloatImage, blur, lay, noise, stroke, write
 
 # fmt: off
 BACKGROUNDS: Final = {"white": 0.22, "tint": 0.12, "paper": 0.26, "coast": 0.14, "realms": 0.1, "fields": 0.08,
                       "town": 0.08}
 # fmt: on
-"""Kind → how often it is chosen."""
+"""Kind → probability."""
 
 PLAIN: Final = ("white", "tint", "paper")
-"""The kinds that are no maps."""
+"""Kinds that are not maps."""
 
 PAPERS: Final = ((250, 247, 238), (244, 234, 212), (236, 220, 188), (226, 205, 165), (238, 236, 230), (222, 214, 200))
 # fmt: off
@@ -28,8 +28,8 @@ INKS: Final = ((50, 40, 34), (96, 66, 44), (30, 30, 34), (70, 64, 84))
 ROOFS: Final = ((206, 100, 78), (184, 88, 70), (120, 110, 104), (216, 150, 110))
 
 
-def draw_background(kind: str, shape: tuple[int, int], rng: np.random.Generator) -> Picture:
-    """(H, W, 3) float32 0-255 of a kind in `BACKGROUNDS`."""
+def draw_background(kind: str, shape: tuple[int, int], rng: np.random.Generator) -> FloatImage:
+    """Draw a background of a kind in `BACKGROUNDS`, (H, W, 3) float32 0-255."""
     if kind == "white":
         return np.full((*shape, 3), 255, np.float32)
     if kind == "tint":
@@ -45,7 +45,7 @@ def draw_background(kind: str, shape: tuple[int, int], rng: np.random.Generator)
     return blur(np.asarray(chart * paper / 255, np.float32), 0.35 * shape[0] / 256)
 
 
-def _paper(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+def _paper(shape: tuple[int, int], rng: np.random.Generator) -> FloatImage:
     """Paper with grain, blotches, sometimes stains and folds."""
     scale = shape[0] / 256
     tone = 1 + 0.012 * rng.standard_normal(shape).astype(np.float32) + 0.018 * noise(rng, shape, 4, 3)
@@ -60,7 +60,7 @@ def _paper(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     return np.asarray(np.clip(np.array(_one(rng, PAPERS)) * tone[..., None], 0, 255), np.float32)
 
 
-def _coast(chart: Picture, rng: np.random.Generator) -> Picture:
+def _coast(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     """Land and sea with water lines along the shore, hills with hachures, rivers."""
     shape = chart.shape[:2]
     scale = shape[0] / 256
@@ -80,7 +80,7 @@ def _coast(chart: Picture, rng: np.random.Generator) -> Picture:
     return lay(chart, ink, 0.7 * _hachures(height, rng))
 
 
-def _realms(chart: Picture, rng: np.random.Generator) -> Picture:
+def _realms(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     """Areas in flat tints with dashed borders between them, and roads."""
     shape = chart.shape[:2]
     scale = shape[0] / 256
@@ -97,7 +97,7 @@ def _realms(chart: Picture, rng: np.random.Generator) -> Picture:
     return lay(lay(chart, _one(rng, INKS), border.astype(np.float32)), _one(rng, INKS), _roads(shape, rng))
 
 
-def _fields(chart: Picture, rng: np.random.Generator) -> Picture:
+def _fields(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     """Long parcels side by side, ditches and a winding canal."""
     shape = chart.shape[:2]
     scale = shape[0] / 256
@@ -115,7 +115,7 @@ def _fields(chart: Picture, rng: np.random.Generator) -> Picture:
     return lay(chart, _one(rng, ((140, 168, 140), (150, 180, 176))), (canal < 3.5).astype(np.float32))
 
 
-def _town(chart: Picture, rng: np.random.Generator) -> Picture:
+def _town(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     """Blocks of houses between streets."""
     shape = chart.shape[:2]
     scale = shape[0] / 256
@@ -138,8 +138,8 @@ def _town(chart: Picture, rng: np.random.Generator) -> Picture:
     return lay(chart, ink, 0.6 * np.clip(1 - np.abs(inward - 2), 0, 1).astype(np.float32))
 
 
-def _turned(shape: tuple[int, int], rng: np.random.Generator, bend: float) -> tuple[Picture, Picture]:
-    """Two coordinates across each other in pixels, turned at random and slightly bent."""
+def _turned(shape: tuple[int, int], rng: np.random.Generator, bend: float) -> tuple[FloatImage, FloatImage]:
+    """Two perpendicular coordinates in pixels, rotated at random and slightly bent."""
     angle, scale = rng.uniform(0, np.pi), shape[0] / 256
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32) - np.float32(shape[0] / 2)
     along, across = x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)
@@ -149,7 +149,7 @@ def _turned(shape: tuple[int, int], rng: np.random.Generator, bend: float) -> tu
     )
 
 
-def _hachures(height: Picture, rng: np.random.Generator) -> Picture:
+def _hachures(height: FloatImage, rng: np.random.Generator) -> FloatImage:
     """Short strokes down the slopes of the higher ground."""
     ink = np.zeros(height.shape, np.float32)
     scale = height.shape[0] / 256
@@ -162,7 +162,7 @@ def _hachures(height: Picture, rng: np.random.Generator) -> Picture:
     return ink
 
 
-def _roads(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+def _roads(shape: tuple[int, int], rng: np.random.Generator) -> FloatImage:
     """Double and single lines across the map, and towns as rings."""
     ink = np.zeros(shape, np.float32)
     scale = shape[0] / 256
@@ -178,7 +178,7 @@ def _roads(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     return ink
 
 
-def _graticule(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+def _graticule(shape: tuple[int, int], rng: np.random.Generator) -> FloatImage:
     """Faint meridians and parallels."""
     scale = shape[0] / 256
     gap, tilt, bend = rng.uniform(35, 90) * scale, rng.normal(0, 0.1), rng.normal(0, 0.15)
@@ -188,8 +188,8 @@ def _graticule(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     return np.asarray(0.5 * np.clip(1 - near / scale, 0, 1), np.float32)
 
 
-def _lettering(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
-    """Some words that mean nothing, at any place, most of them nearly level."""
+def _lettering(shape: tuple[int, int], rng: np.random.Generator) -> FloatImage:
+    """Random letters as words, anywhere, most of them nearly level."""
     ink = np.zeros(shape, np.float32)
     scale = shape[0] / 256
     for _ in range(int(rng.integers(0, 9))):
@@ -200,12 +200,12 @@ def _lettering(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
     return ink * np.float32(0.85)
 
 
-def _gradient(field: Picture) -> tuple[Picture, Picture]:
+def _gradient(field: FloatImage) -> tuple[FloatImage, FloatImage]:
     down, right = np.gradient(field)
     return np.asarray(down, np.float32), np.asarray(right, np.float32)
 
 
-def _slope(field: Picture) -> NDArray[np.float32]:
+def _slope(field: FloatImage) -> NDArray[np.float32]:
     return np.asarray(np.hypot(*_gradient(field)), np.float32)
 
 

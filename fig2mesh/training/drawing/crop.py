@@ -1,4 +1,4 @@
-"""One crop for the figure parser: a drawing cut out round its figure, and which of its joints show."""
+"""One crop for the figure parser: a drawing cut out around its figure, and the visibility of its joints."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART, SIDES
 
 SIZE: Final = 256
-"""Pixels a side of a crop."""
+"""Edge of a crop, pixels."""
 
 
 MARGIN, ROOM = 0.06, 0.3
-"""What is kept round a figure with transparency, and round one on a background of its own; share of its size."""
+"""Margin around a figure with transparency, and around one on a background of its own; share of its size."""
 
 
 # fmt: off
@@ -66,7 +66,7 @@ def cut(
     visible: NDArray[np.bool_],
     margin: float,
 ) -> Crop | None:
-    """The square round the figure, resized to `SIZE`; None where there is none. Beyond the picture nothing is seen."""
+    """Cut out the square around the figure, resized to `SIZE`; None without a figure. Empty beyond the picture."""
     rows, columns = np.flatnonzero((labels > 0).any(axis=1)), np.flatnonzero((labels > 0).any(axis=0))
     if len(rows) < 8 or len(columns) < 4:
         return None
@@ -90,14 +90,14 @@ def cut(
 
 
 def _centred(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """OpenCV's pixel centres lie on whole numbers, ours half a pixel further."""
+    """Shift a matrix to OpenCV's pixel centres, which lie on whole numbers; elsewhere here they lie at +0.5."""
     out = matrix.copy()
     out[:, 2] += 0.5 * matrix[:, :2].sum(axis=1) - 0.5
     return out
 
 
-def seen_joints(labels: NDArray[np.uint8], joints: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """(21,) bool: joints (21, 2) in pixels whose place shows one of their own parts."""
+def visible_joints(labels: NDArray[np.uint8], joints: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """(21,) bool: joints (21, 2) in pixels at which one of their own parts is visible."""
     height, width = labels.shape
     out = np.zeros(len(joints), bool)
     for index, (x, y) in enumerate(joints):

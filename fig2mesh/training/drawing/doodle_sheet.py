@@ -1,4 +1,4 @@
-"""How doodles are inked and coloured: fills, outlines, faces, crayon strokes, an unsteady hand."""
+"""Inking and colouring of doodles: fills, outlines, faces, crayon strokes, an unsteady hand."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fig2mesh.skeleton import JOINT, PART
-from fig2mesh.training.drawing.crop import MARGIN, Crop, cut, seen_joints
-from fig2mesh.training.drawing.doodle_shapes import CANVAS, Manner, pixel, shapes_of
+from fig2mesh.training.drawing.crop import MARGIN, Crop, cut, visible_joints
+from fig2mesh.training.drawing.doodle_shapes import CANVAS, DoodleStyle, pixel, shapes_of
 from fig2mesh.training.drawing.styles import BRIGHTS, HAIRS, INKS, MAP_TINTS, SKINS
 from fig2mesh.training.drawing.thing_shapes import Thing
 from fig2mesh.training.drawing.worn import things
@@ -22,51 +22,51 @@ FILL: Final = 0.66
 Colour = tuple[float, ...]
 
 
-def draw_doodle(joints: NDArray[np.float64], manner: Manner, rng: np.random.Generator) -> Crop | None:
+def draw_doodle(joints: NDArray[np.float64], style: DoodleStyle, rng: np.random.Generator) -> Crop | None:
     tall = FILL * CANVAS
     ink: Colour = tuple(float(v) for v in list(INKS)[int(rng.integers(len(INKS)))])
     if rng.random() < 0.15:
         ink = tuple(rng.uniform(0, 140, 3).tolist())
-    colours = _colours(manner, ink, rng)
-    sheet = Sheet(ink, manner.line)
-    shapes = shapes_of(joints, manner, tall, rng)
+    colours = _colours(style, ink, rng)
+    canvas = DoodleCanvas(ink, style.line)
+    shapes = shapes_of(joints, style, tall, rng)
     fake = np.zeros((CANVAS, CANVAS), np.uint8)
     worn = [t for t in things(joints, fake, rng) if rng.random() < 0.6]
     behind = [t for t in worn if not t.front]
     shapes = [*[_thing(t) for t in behind], *shapes, *[_thing(t) for t in worn if t.front]]
-    outline = manner.line > 0
-    if manner.union and outline:
+    outline = style.line > 0
+    if style.union and outline:
         for label, mask in shapes:
-            sheet.put(mask, label, ink, True)
+            canvas.put(mask, label, ink, True)
     for label, mask in shapes:
         if not mask.any():
             continue
-        fill = colours[label] if manner.filled or label >= PART["hair"] or _thin(mask) else None
-        if manner.union and outline:
+        fill = colours[label] if style.filled or label >= PART["hair"] or _thin(mask) else None
+        if style.union and outline:
             inside = cv2.erode(mask, np.ones((2, 2), np.uint8))
-            if manner.filled:
-                sheet.put(inside, label, fill, False)
+            if style.filled:
+                canvas.put(inside, label, fill, False)
             else:
-                sheet.labels[mask > 127] = label
-                sheet.cover[inside > 127] = 0.0
+                canvas.labels[mask > 127] = label
+                canvas.cover[inside > 127] = 0.0
                 if _thin(mask):
-                    sheet.cover[mask > 127] = 1.0
+                    canvas.cover[mask > 127] = 1.0
         else:
-            sheet.put(mask, label, fill, outline and not (_thin(mask) and manner.limb < 0.03))
-    _scribble(sheet, manner, rng)
-    face = _face(sheet, joints, manner, tall, rng)
-    visible = seen_joints(sheet.labels, joints[:, :2])
+            canvas.put(mask, label, fill, outline and not (_thin(mask) and style.limb < 0.03))
+    _scribble(canvas, style, rng)
+    face = _face(canvas, joints, style, tall, rng)
+    visible = visible_joints(canvas.labels, joints[:, :2])
     visible[JOINT["eyes"]] &= face
-    rgba = np.dstack([sheet.colour, sheet.cover * 255])
+    rgba = np.dstack([canvas.colour, canvas.cover * 255])
     rgba, labels = _wobbled(
-        rgba, sheet.labels, rng.uniform(0, 5) if manner.kind == "child" else rng.uniform(0, 1.5), rng
+        rgba, canvas.labels, rng.uniform(0, 5) if style.kind == "child" else rng.uniform(0, 1.5), rng
     )
     rgba[..., :3] = np.where(rgba[..., 3:] > 0, rgba[..., :3], 255)
     return cut(rgba.astype(np.uint8), labels, joints, visible, MARGIN)
 
 
-class Sheet:
-    """What is drawn so far: colours, cover and labels, `CANVAS` pixels a side."""
+class DoodleCanvas:
+    """Picture of a doodle while it is drawn: colours, coverage and labels, `CANVAS` pixels square."""
 
     def __init__(self, ink: Colour, line: float) -> None:
         self.colour = np.zeros((CANVAS, CANVAS, 3), np.float32)
@@ -75,7 +75,7 @@ class Sheet:
         self.ink, self.line = ink, line
 
     def put(self, mask: NDArray[np.uint8], label: int, fill: Colour | None, outline: bool) -> None:
-        """A shape (H, W) 0/255 in front of what is there; without a fill it hides nothing but lines under it."""
+        """Draw a shape (H, W) 0/255 in front of the others; without a fill it hides only the lines under it."""
         half = max(round(self.line * CANVAS * FILL), 1)
         inside = mask > 127
         if outline and self.line > 0:
@@ -101,15 +101,15 @@ def _thing(thing: Thing) -> tuple[int, NDArray[np.uint8]]:
     return thing.label, thing.mask.astype(np.uint8) * 255
 
 
-def _colours(manner: Manner, ink: Colour, rng: np.random.Generator) -> list[Colour]:
-    """A colour a part label."""
+def _colours(style: DoodleStyle, ink: Colour, rng: np.random.Generator) -> list[Colour]:
+    """One colour per part label."""
     tints = BRIGHTS if rng.random() < 0.5 else MAP_TINTS
 
     def pick(options: Sequence[tuple[int, int, int]]) -> Colour:
         return tuple(float(v) for v in options[int(rng.integers(len(options)))])
 
-    if manner.solid:
-        one = ink if manner.kind in ("stick", "pictogram") and rng.random() < 0.7 else pick(tints)
+    if style.solid:
+        one = ink if style.kind in ("stick", "pictogram") and rng.random() < 0.7 else pick(tints)
         out = [one] * 18
         if rng.random() < 0.3:
             out[PART["head"]] = pick(SKINS)
@@ -131,18 +131,20 @@ def _colours(manner: Manner, ink: Colour, rng: np.random.Generator) -> list[Colo
     return out
 
 
-def _face(sheet: Sheet, joints: NDArray[np.float64], manner: Manner, tall: float, rng: np.random.Generator) -> bool:
-    """Eyes and mouth, at times; whether there are eyes."""
+def _face(
+    canvas: DoodleCanvas, joints: NDArray[np.float64], style: DoodleStyle, tall: float, rng: np.random.Generator
+) -> bool:
+    """Draw eyes and mouth, at times; True where there are eyes."""
     head, eyes, neck = (joints[JOINT[name], :2] for name in ("head", "eyes", "neck"))
     averted = joints[JOINT["eyes"], 2] < joints[JOINT["head"], 2] - 1
     if (
         averted
-        or rng.random() < {"stick": 0.6, "pictogram": 0.95, "child": 0.1, "blob": 0.6, "cartoon": 0.15}[manner.kind]
+        or rng.random() < {"stick": 0.6, "pictogram": 0.95, "child": 0.1, "blob": 0.6, "cartoon": 0.15}[style.kind]
     ):
         return False
     up = (head - neck) / max(float(np.linalg.norm(head - neck)), 1.0)
     across = np.array([-up[1], up[0]])
-    radius = manner.head * tall
+    radius = style.head * tall
     layer = np.zeros((CANVAS, CANVAS), np.uint8)
     dot = max(int(radius * rng.uniform(0.06, 0.14)), 1)
     for side in (-1, 1):
@@ -152,36 +154,39 @@ def _face(sheet: Sheet, joints: NDArray[np.float64], manner: Manner, tall: float
         for x in np.linspace(-1, 1, 5)
     ]
     cv2.polylines(layer, [np.rint(np.stack(mouth)).astype(np.int32)], False, 255, max(int(radius * 0.08), 1))
-    on = (layer > 0) & (sheet.labels == PART["head"])
-    under = sheet.colour[sheet.labels == PART["head"]]
-    dark = len(under) > 0 and sheet.cover[sheet.labels == PART["head"]].mean() > 0.5 and under.mean() < 80
-    sheet.colour[on], sheet.cover[on] = ((255.0, 255.0, 255.0) if dark else tuple(min(v, 90) for v in sheet.ink)), 1.0
+    on = (layer > 0) & (canvas.labels == PART["head"])
+    under = canvas.colour[canvas.labels == PART["head"]]
+    dark = len(under) > 0 and canvas.cover[canvas.labels == PART["head"]].mean() > 0.5 and under.mean() < 80
+    canvas.colour[on], canvas.cover[on] = (
+        ((255.0, 255.0, 255.0) if dark else tuple(min(v, 90) for v in canvas.ink)),
+        1.0,
+    )
     return True
 
 
-def _scribble(sheet: Sheet, manner: Manner, rng: np.random.Generator) -> None:
-    """Strokes inside the figure: crayon, hatching, shading of blobs."""
-    inside = sheet.labels > 0
-    if manner.kind == "blob" and rng.random() < 0.6:
+def _scribble(canvas: DoodleCanvas, style: DoodleStyle, rng: np.random.Generator) -> None:
+    """Draw strokes inside the figure: crayon, hatching, shading of blobs."""
+    inside = canvas.labels > 0
+    if style.kind == "blob" and rng.random() < 0.6:
         y, x = np.mgrid[:CANVAS, :CANVAS] / CANVAS
         light = 0.8 + 0.35 * np.sin(rng.uniform(2, 14) * (x * rng.normal() + y * rng.normal()) + rng.uniform(0, 6))
-        sheet.colour = np.clip(sheet.colour * light[..., None], 0, 255).astype(np.float32)
-    if rng.random() < (0.4 if manner.kind == "child" else 0.12):
+        canvas.colour = np.clip(canvas.colour * light[..., None], 0, 255).astype(np.float32)
+    if rng.random() < (0.4 if style.kind == "child" else 0.12):
         layer = np.zeros((CANVAS, CANVAS), np.uint8)
         angle, gap = rng.uniform(0, np.pi), rng.uniform(5, 16)
         way, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
         for place in np.arange(-CANVAS, CANVAS, gap):
             centre = np.array([CANVAS / 2, CANVAS / 2]) + side * (place + rng.normal(0, 2))
             cv2.line(layer, pixel(centre - way * CANVAS), pixel(centre + way * CANVAS), 255, int(rng.integers(1, 4)))
-        chosen = np.isin(sheet.labels, rng.choice(np.arange(1, 18), int(rng.integers(3, 17)), replace=False))
+        chosen = np.isin(canvas.labels, rng.choice(np.arange(1, 18), int(rng.integers(3, 17)), replace=False))
         on = (layer > 0) & chosen & inside
-        sheet.colour[on], sheet.cover[on] = sheet.ink, np.maximum(sheet.cover[on], rng.uniform(0.5, 1))
+        canvas.colour[on], canvas.cover[on] = canvas.ink, np.maximum(canvas.cover[on], rng.uniform(0.5, 1))
 
 
 def _wobbled(
     rgba: NDArray[np.float32], labels: NDArray[np.uint8], amount: float, rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """The drawing as by an unsteady hand, `amount` pixels."""
+    """Warp the drawing as by an unsteady hand, `amount` pixels."""
     if amount < 0.3:
         return rgba, labels
     y, x = np.mgrid[:CANVAS, :CANVAS].astype(np.float32)

@@ -1,7 +1,7 @@
-"""Drawn figures that no body model gives: stick figures, pictograms, children's drawings, figures of blobs.
+"""Drawn figures without a body model: stick figures, pictograms, children's drawings, figures of blobs.
 
-Each is a list of shapes, one or more a body part, along the bones of a skeleton; a manner says how wide, how filled
-and how outlined they are. They are drawn twice as large and shrunk, for smooth edges.
+Each is a list of shapes, one or more per body part, along the bones of a skeleton; a style sets their widths, fills
+and outlines. They are drawn twice as large and shrunk, for smooth edges.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.skeletons import DRAWN, Sampler, Skeletons
 from fig2mesh.training.drawing.crop import Crop
-from fig2mesh.training.drawing.doodle_shapes import CANVAS, Manner
+from fig2mesh.training.drawing.doodle_shapes import CANVAS, DoodleStyle
 from fig2mesh.training.drawing.doodle_sheet import FILL, draw_doodle
 
 FILLED: Final = {"stick": 0.4, "pictogram": 1.0, "child": 0.45, "blob": 0.95, "cartoon": 0.85}
 ONE_COLOUR: Final = {"stick": 0.7, "pictogram": 0.85, "child": 0.5, "blob": 0.6, "cartoon": 0.1}
-MANNERS: Final = {"stick": 0.22, "pictogram": 0.2, "child": 0.2, "blob": 0.16, "cartoon": 0.22}
+STYLES: Final = {"stick": 0.22, "pictogram": 0.2, "child": 0.2, "blob": 0.16, "cartoon": 0.22}
 
 
 class Doodler:
-    """Draws doodles in the poses of a pack; poses of held-out clips for any split but "train"."""
+    """Generator of doodles in the poses of a pack; poses of held-out clips for any split but "train"."""
 
     def __init__(self, pack: Pack, split: str) -> None:
         poses = pack.training_poses if split == "train" else pack.held_out_poses
         self.sampler = Sampler(Skeletons.from_rigs([pack.anny.rig], poses))
 
     def draw(self, count: int, rng: np.random.Generator) -> list[Crop]:
-        """(count) doodles; a few fewer where a pose folds up to nothing."""
+        """Draw `count` doodles, fewer where a pose is too small to draw."""
         generator = torch.Generator().manual_seed(int(rng.integers(2**31)))
         sample = self.sampler.draw(count, DRAWN, generator)
         made = []
@@ -45,23 +45,23 @@ class Doodler:
 
 
 def doodle(joints: NDArray[np.float64], rng: np.random.Generator) -> Crop | None:
-    """One drawing of a skeleton (21, 3), FIGURE units, y up, z to the viewer."""
-    manner = _manner(rng)
-    points = _moulded(joints, manner, rng)
+    """Draw a skeleton (21, 3), FIGURE units, y up, z to the viewer."""
+    style = _random_style(rng)
+    points = _moulded(joints, style, rng)
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     scale = FILL * CANVAS / max(float((high - low).max()), 1e-6)
     pixels = np.empty_like(points)
     pixels[:, 0] = (points[:, 0] - (low[0] + high[0]) / 2) * scale + CANVAS / 2
     pixels[:, 1] = CANVAS / 2 - (points[:, 1] - (low[1] + high[1]) / 2) * scale
     pixels[:, 2] = points[:, 2] * scale
-    return draw_doodle(pixels, manner, rng)
+    return draw_doodle(pixels, style, rng)
 
 
-def _manner(rng: np.random.Generator) -> Manner:
-    kind = str(rng.choice(list(MANNERS), p=list(MANNERS.values())))
+def _random_style(rng: np.random.Generator) -> DoodleStyle:
+    kind = str(rng.choice(list(STYLES), p=list(STYLES.values())))
     u = rng.uniform
     thin = kind == "stick" or (kind == "child" and rng.random() < 0.3)
-    return Manner(
+    return DoodleStyle(
         kind=kind,
         limb=u(0.008, 0.03) if thin else u(0.03, 0.11) if kind != "blob" else u(0.02, 0.1),
         taper=1.0 if kind in ("stick", "pictogram") and rng.random() < 0.8 else u(0.5, 1.3),
@@ -84,7 +84,7 @@ def _manner(rng: np.random.Generator) -> Manner:
 
 
 def stance(rng: np.random.Generator) -> NDArray[np.float64]:
-    """(21, 3) a stance as children and makers of signs draw it: seen from the front, every limb at some angle."""
+    """(21, 3) joints of a stance as in children's drawings and signs: from the front, every limb at a random angle."""
     out = np.zeros((21, 3))
 
     def put(name: str, base: str, length: float, angle: float, z: float = 0.0) -> None:
@@ -125,12 +125,12 @@ def stance(rng: np.random.Generator) -> NDArray[np.float64]:
     return out
 
 
-def _moulded(joints: NDArray[np.float64], manner: Manner, rng: np.random.Generator) -> NDArray[np.float64]:
-    """The skeleton with the manner's proportions: the head as large as it is drawn, stick figures without width."""
+def _moulded(joints: NDArray[np.float64], style: DoodleStyle, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Give the skeleton the proportions of the style: the head as large as it is drawn, stick figures without width."""
     out = joints.copy()
     tall = float(np.ptp(out[:, 1]) + 1e-6)
     tall = max(tall, 0.6 * float(np.ptp(out[:, 0])), 0.5)
-    flat = rng.uniform(0, 0.6) if manner.kind == "stick" else rng.uniform(0.6, 1.2)
+    flat = rng.uniform(0, 0.6) if style.kind == "stick" else rng.uniform(0.6, 1.2)
     for name in ("shoulder", "hip"):
         base = "thorax" if name == "shoulder" else "pelvis"
         for side in "lr":
@@ -140,9 +140,9 @@ def _moulded(joints: NDArray[np.float64], manner: Manner, rng: np.random.Generat
                 out[JOINT[f"{side}_{joint}"]] += move
     up = out[JOINT["head"]] - out[JOINT["neck"]]
     length = max(float(np.linalg.norm(up[:2])), 1e-6)
-    want = (manner.head * rng.uniform(0.95, 1.1) + manner.gap) * tall
+    want = (style.head * rng.uniform(0.95, 1.1) + style.gap) * tall
     shift = up * (want / length - 1)
-    look = (out[JOINT["eyes"]] - out[JOINT["head"]]) * np.clip(manner.head * tall / 0.12, 0.5, 2)
+    look = (out[JOINT["eyes"]] - out[JOINT["head"]]) * np.clip(style.head * tall / 0.12, 0.5, 2)
     out[JOINT["head"]] += shift
     out[JOINT["eyes"]] = out[JOINT["head"]] + look
     return out

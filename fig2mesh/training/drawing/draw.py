@@ -1,9 +1,9 @@
-"""Turn what a camera sees of a body into a picture that looks drawn.
+"""Turn the view of a body into a picture that looks drawn.
 
-`random_style` chooses once for all views of a body; `draw` applies it. Every random choice comes from the generator
-that is passed in. VIEW: x to the right as seen, y up, z to the viewer.
+`random_style` chooses once for all views of a body; `draw` applies it. Every random choice comes from the given
+generator. VIEW: x to the right as seen, y up, z to the viewer.
 
-Measured on one core: 30 ms a picture of 256 x 256, 130 ms one of 512 x 512 shrunk to it.
+Measured on one core: 30 ms per picture of 256 x 256, 130 ms per one of 512 x 512 shrunk to it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.background import PLAIN, draw_background
 from fig2mesh.training.drawing.faces import Face, draw_face
-from fig2mesh.training.drawing.marks import Picture, blur, distance, lay, noise, warp
+from fig2mesh.training.drawing.marks import FloatImage, blur, distance, lay, noise, warp
 from fig2mesh.training.drawing.styles import Style, pattern_coverage, random_style
 
 JUMP: Final = 0.05
@@ -25,7 +25,7 @@ JUMP: Final = 0.05
 
 
 class Layers(NamedTuple):
-    """What a camera sees.
+    """Layers of a view of a body.
 
     labels : (H, W) uint8, `PART_NAMES`; 0 where nothing
     material : (H, W) int, index of the material; -1 where nothing
@@ -49,15 +49,15 @@ def draw(
     style: Style | None = None,
     face: Face | None = None,
     shrink: int = 1,
-    paper: Picture | None = None,
+    paper: FloatImage | None = None,
 ) -> NDArray[np.uint8]:
-    """(H / shrink, W / shrink, 3) uint8, opaque.
+    """Draw a picture, (H / shrink, W / shrink, 3) uint8, opaque.
 
-    materials : names, as `random_style` takes them; eyes count as skin, for faces are drawn, not seen
+    materials : names, as `random_style` takes them; eyes count as skin, since faces are drawn
     style : None for a random one
-    face : where the face is; None when the viewer does not see it
-    shrink : average this many pixels a side into one, for smooth edges
-    paper : (H, W, 3) 0-255 what is drawn on; None to draw one of the style's kind
+    face : position of the face; None where it is not visible
+    shrink : edge of the squares of pixels averaged into one, for smooth edges
+    paper : (H, W, 3) 0-255 background; None to draw one of the style's kind
     """
     style = random_style(materials, rng) if style is None else style
     layers = layers._replace(material=_without_eyes(layers.material, materials))
@@ -81,7 +81,7 @@ def draw(
 
 
 def contours(layers: Layers, joints: bool = False) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(H, W) bool each: pixels of the silhouette, and pixels on the nearer side of the contours inside it.
+    """(H, W) bool each: pixels of the silhouette's contour, and pixels on the nearer side of the contours inside it.
 
     joints : count changes of the part label even where material and surface go on
     """
@@ -96,7 +96,7 @@ def contours(layers: Layers, joints: bool = False) -> tuple[NDArray[np.bool_], N
         np.subtract(depth[1:], depth[:-1], out=step, where=both)
         size = np.abs(np.pad(step, ((1, 1), (0, 0)), constant_values=np.inf))
         # A steep but smooth surface has steep neighbours; a jump has none on at least one side. Beside the silhouette
-        # only the other side can tell.
+        # only the other side is known.
         jump = size[1:-1] > JUMP + 2 * np.minimum(size[:-2], size[2:])
         edge = both & ((kind[1:] != kind[:-1]) | jump | ((part[1:] != part[:-1]) & joints))
         line[1:] |= edge & (step > 0)
@@ -106,8 +106,8 @@ def contours(layers: Layers, joints: bool = False) -> tuple[NDArray[np.bool_], N
     return outer, inner
 
 
-def ink(layers: Layers, style: Style, rng: np.random.Generator) -> Picture:
-    """(H, W) float32 0-1, how much of a pixel the lines cover: no wider than 4 px at 256, all 0 for a width of 0."""
+def ink(layers: Layers, style: Style, rng: np.random.Generator) -> FloatImage:
+    """(H, W) float32 0-1, coverage of the pixels by lines: no wider than 4 px at 256, all 0 for a width of 0."""
     shape = (layers.material.shape[0], layers.material.shape[1])
     scale = shape[0] / 256
     swell = np.clip(1 + 0.3 * noise(rng, shape, 14), 0.5, 1.6)
@@ -143,13 +143,13 @@ def uv_grain(layers: Layers) -> float:
 
 
 def _filled(
-    paper: Picture,
+    paper: FloatImage,
     layers: Layers,
     seen: NDArray[np.bool_],
     style: Style,
     rng: np.random.Generator,
-) -> Picture:
-    """The figure's areas on the paper, lines left out."""
+) -> FloatImage:
+    """The figure's filled areas on the paper, without lines."""
     shape, scale = paper.shape[:2], paper.shape[0] / 256
     shade = layers.normals @ np.asarray(style.light, np.float32)
     if style.fill == "paper":
@@ -181,7 +181,7 @@ def _filled(
         stray = [np.zeros(shape, np.float32)] * 2
     if style.fill == "wash" or style.slip != (0.0, 0.0):
         right, down = (stray[axis] + np.float32(style.slip[axis] * scale) for axis in (0, 1))
-        # Colour and cover move together: what lies beyond the figure has a colour too, but no cover.
+        # Colour and cover move together: pixels beyond the figure have a colour too, but no cover.
         colour, cover = warp(colour, right, down, nearest=True), warp(cover, right, down)
     if style.glaze:
         colour = colour * paper / 255
@@ -190,14 +190,14 @@ def _filled(
 
 
 def _hatched(
-    picture: Picture,
+    picture: FloatImage,
     layers: Layers,
     shade: NDArray[np.float32],
     seen: NDArray[np.bool_],
     style: Style,
     rng: np.random.Generator,
-) -> Picture:
-    """An engraver's lines, thicker and crossed where it is darker; they bend with the form."""
+) -> FloatImage:
+    """Engraved hatching, thicker and crossed where it is darker; it bends with the form."""
     shape, scale = picture.shape[:2], picture.shape[0] / 256
     tone = style.colours.mean(axis=1)[np.maximum(layers.material, 0)] / 255
     pale = lay(picture, (250, 246, 238), seen * np.float32(rng.uniform(0.4, 1)))

@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.training.drawing.marks import Picture, ellipse, lay, stroke
+from fig2mesh.training.drawing.marks import FloatImage, ellipse, lay, stroke
 from fig2mesh.training.drawing.styles import Style
 
 
 class Face(NamedTuple):
-    """Where a face is.
+    """Position of a face.
 
-    eyes : (N, 2) x, y in pixels of the eyes that are seen, 1 or 2 of them
+    eyes : (N, 2) x, y in pixels of the visible eyes, 1 or 2 of them
     mouth : (2,) x, y in pixels
-    turn : how far the face looks to the right of the picture, -1 (left profile) to 1; 0 looks at the viewer
+    turn : rotation of the face to the right of the picture, -1 (left profile) to 1; 0 faces the viewer
     """
 
     eyes: NDArray[np.floating]
@@ -25,14 +25,14 @@ class Face(NamedTuple):
 
 
 def draw_face(
-    picture: Picture,
+    picture: FloatImage,
     face: Face,
     canvas: NDArray[np.bool_],
     style: Style,
     hair: NDArray[np.floating],
     rng: np.random.Generator,
-) -> Picture:
-    """The picture with a face on it.
+) -> FloatImage:
+    """Draw a face on the picture.
 
     canvas : (H, W) bool, bare skin of the head; nothing is drawn beside it
     hair : (3,) 0-255, colour of brows and beard
@@ -45,12 +45,12 @@ def draw_face(
     down = (mouth - middle) / size
     right = np.array([down[1], -down[0]])
     shape = canvas.shape
-    look, smile, open_mouth, bushy = face.turn, rng.normal(0.12, 0.12), rng.random() < 0.15, rng.uniform(0.07, 0.16)
-    gaze = right * 0.08 * rng.normal() + right * 0.06 * look
-    narrow = max(1 - 0.55 * abs(look), 0.45)
+    turn, smile, open_mouth, bushy = face.turn, rng.normal(0.12, 0.12), rng.random() < 0.15, rng.uniform(0.07, 0.16)
+    gaze = right * 0.08 * rng.normal() + right * 0.06 * turn
+    narrow = max(1 - 0.55 * abs(turn), 0.45)
 
     def place(x: float, y: float, origin: NDArray[np.floating] = mouth) -> NDArray[np.floating]:
-        """Face coordinates, in distances from eyes to mouth, as pixels."""
+        """Convert face coordinates, in distances from eyes to mouth, to pixels."""
         return np.asarray(origin + size * (x * right + y * down))
 
     row, column = np.clip(middle[::-1].astype(int), 0, np.array(shape) - 1)
@@ -58,8 +58,8 @@ def draw_face(
     black = np.zeros(shape, np.float32)
     if rng.random() < 0.25:  # cheeks
         for side in (-1, 1):
-            spot = ellipse(shape, place(side * 0.6 * narrow + 0.2 * look, -0.35), (0.22 * size, 0.18 * size))
-            picture = lay(picture, (226, 110, 100), 0.35 * spot * canvas)
+            cheek = ellipse(shape, place(side * 0.6 * narrow + 0.2 * turn, -0.35), (0.22 * size, 0.18 * size))
+            picture = lay(picture, (226, 110, 100), 0.35 * cheek * canvas)
     if style.beard != "none":
         picture = lay(picture, hair, _beard(style.beard, shape, mouth, right, down, size, narrow) * canvas)
     for eye in eyes:
@@ -76,9 +76,9 @@ def draw_face(
     brows = np.zeros(shape, np.float32)
     for line in features:
         stroke(brows, line, bushy * size)
-    bend = 0.0 if abs(look) > 0.3 else rng.choice([-0.1, 0.1])
-    tip = place(bend + 0.28 * look, -0.42)
-    stroke(black, [place(0.15 * look, -0.85), tip, place(0.05 * look, -0.36)][rng.integers(2) :], 0.06 * size)
+    bend = 0.0 if abs(turn) > 0.3 else rng.choice([-0.1, 0.1])
+    tip = place(bend + 0.28 * turn, -0.42)
+    stroke(black, [place(0.15 * turn, -0.85), tip, place(0.05 * turn, -0.36)][rng.integers(2) :], 0.06 * size)
     half = rng.uniform(0.2, 0.42) * narrow
     lips = [place(x * half, smile * (0.5 - x * x)) for x in np.linspace(-1, 1, 7)]
     if open_mouth:
@@ -100,7 +100,7 @@ def _beard(
     down: NDArray[np.floating],
     size: float,
     narrow: float,
-) -> Picture:
+) -> FloatImage:
     """(H, W) coverage of a beard or moustache; it leaves the mouth free."""
     angle = float(np.arctan2(right[1], right[0]))
     out = np.zeros(shape, np.float32)

@@ -1,18 +1,18 @@
-"""Things that people hold in a hand: staffs, swords, flags, umbrellas, tools, cups, balls, bags, flowers, shields."""
+"""Things held in a hand: staffs, swords, flags, umbrellas, tools, cups, balls, bags, flowers, shields."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fig2mesh.skeleton import PART
-from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, ellipse, line, polygon, tall_of
+from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, body_length, ellipse, line, polygon
 
 
 def held(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
-    """A staff, sword, flag, umbrella, tool, cup, ball, box, bag, flowers or a shield in one hand."""
+    """Draw a staff, sword, flag, umbrella, tool, cup, ball, box, bag, flowers or a shield in one hand."""
     side = str(rng.choice(["l", "r"]))
     hand, wrist = at(joints, f"{side}_hand", f"{side}_wrist")
-    tall = tall_of(joints)
+    tall = body_length(joints)
     tilt = rng.normal(0, 0.25)
     up = np.array([np.sin(tilt), -np.cos(tilt)])
     across = np.array([-up[1], up[0]])

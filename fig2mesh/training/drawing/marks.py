@@ -1,4 +1,4 @@
-"""Noise, blur, distance, brush strokes and letters: what drawn pictures are made of, in NumPy alone.
+"""Noise, blur, distance, brush strokes and letters for drawn pictures, in NumPy alone.
 
 Pictures are (H, W) or (H, W, C) float32; pixel centres lie at +0.5, row 0 on top; positions are (x, y) in pixels.
 """
@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-Picture = NDArray[np.float32]
+FloatImage = NDArray[np.float32]
 
 LETTERS: Final = {
     letter: bytes.fromhex(columns)
@@ -41,13 +41,13 @@ LETTERS: Final = {
         "Z": "6151494543",
     }.items()
 }
-"""Letters of 5 x 7 dots: a byte a column, the lowest bit on top."""
+"""Letters of 5 x 7 dots: one byte per column, the lowest bit on top."""
 
 
-def noise(rng: np.random.Generator, shape: tuple[int, int], cells: float, octaves: int = 1) -> Picture:
+def noise(rng: np.random.Generator, shape: tuple[int, int], cells: float, octaves: int = 1) -> FloatImage:
     """(H, W) smooth random field of mean 0 and variance about 1, with `cells` cells across the wider side.
 
-    octaves : how many fields, each twice as fine and half as strong as the one before, are added up
+    octaves : number of fields, each twice as fine and half as strong as the one before, that are added up
     """
     total = np.zeros(shape, np.float64)
     power = 0.0
@@ -61,7 +61,7 @@ def noise(rng: np.random.Generator, shape: tuple[int, int], cells: float, octave
     return np.asarray(total / (151 / 315 * np.sqrt(power)), np.float32)
 
 
-def blur(picture: Picture, sigma: float) -> Picture:
+def blur(picture: FloatImage, sigma: float) -> FloatImage:
     """Gaussian blur along rows and columns; the border is repeated outwards."""
     if sigma <= 0:
         return picture
@@ -77,7 +77,7 @@ def blur(picture: Picture, sigma: float) -> Picture:
     return np.ascontiguousarray(picture)
 
 
-def distance(mask: NDArray[np.bool_], reach: int) -> Picture:
+def distance(mask: NDArray[np.bool_], reach: int) -> FloatImage:
     """(H, W) distance to the nearest pixel of a mask, exact up to `reach` pixels, infinite beyond."""
     if not mask.any():
         return np.full(mask.shape, np.inf, np.float32)
@@ -91,8 +91,8 @@ def distance(mask: NDArray[np.bool_], reach: int) -> Picture:
     return np.asarray(np.sqrt(squared), np.float32)
 
 
-def warp(picture: NDArray[Any], right: Picture, down: Picture, *, nearest: bool = False) -> NDArray[Any]:
-    """The picture seen at each pixel's place plus (right, down) pixels; the border is repeated outwards."""
+def warp(picture: NDArray[Any], right: FloatImage, down: FloatImage, *, nearest: bool = False) -> NDArray[Any]:
+    """Sample the picture at each pixel's position plus (right, down) pixels; the border is repeated outwards."""
     height, width = picture.shape[:2]
     row = np.clip(np.arange(height, dtype=np.float32)[:, None] + down, 0, height - 1)
     column = np.clip(np.arange(width, dtype=np.float32) + right, 0, width - 1)
@@ -107,7 +107,7 @@ def warp(picture: NDArray[Any], right: Picture, down: Picture, *, nearest: bool 
     return np.asarray(upper * (1 - fy) + lower * fy, np.float32)
 
 
-def stroke(coverage: Picture, points: Any, width: float) -> None:
+def stroke(coverage: FloatImage, points: Any, width: float) -> None:
     """Draw a line through `points` (N, 2) with a round brush into `coverage` (H, W), 0-1, in place.
 
     One point makes a dot. A brush finer than a pixel leaves a paler line.
@@ -127,7 +127,7 @@ def stroke(coverage: Picture, points: Any, width: float) -> None:
         np.maximum(coverage[rows, columns], ink, out=coverage[rows, columns])
 
 
-def ellipse(shape: tuple[int, ...], centre: Any, radii: tuple[float, float], angle: float = 0.0) -> Picture:
+def ellipse(shape: tuple[int, ...], centre: Any, radii: tuple[float, float], angle: float = 0.0) -> FloatImage:
     """(H, W) coverage 0-1 of a filled ellipse with a soft rim of one pixel; angle in radians from x towards y."""
     out = np.zeros(shape[:2], np.float32)
     rx, ry = max(radii[0], 0.3), max(radii[1], 0.3)
@@ -140,8 +140,8 @@ def ellipse(shape: tuple[int, ...], centre: Any, radii: tuple[float, float], ang
     return out
 
 
-def write(coverage: Picture, text: str, at: Any, height: float, angle: float = 0.0, spacing: float = 1.0) -> None:
-    """Letter `text` from the upper left corner `at`, in place; letters not in `LETTERS` leave a gap.
+def write(coverage: FloatImage, text: str, at: Any, height: float, angle: float = 0.0, spacing: float = 1.0) -> None:
+    """Draw `text` from the upper left corner `at`, in place; letters not in `LETTERS` leave a gap.
 
     height : of the letters, pixels; angle : radians from x towards y; spacing : dots between letters
     """
@@ -166,8 +166,8 @@ def write(coverage: Picture, text: str, at: Any, height: float, angle: float = 0
     np.maximum(coverage[rows, columns], ink, out=coverage[rows, columns])
 
 
-def lay(picture: Picture, colour: Any, coverage: Picture) -> Picture:
-    """The picture (H, W, 3) with a colour, or another picture, over it where `coverage` (H, W) is 1."""
+def lay(picture: FloatImage, colour: Any, coverage: FloatImage) -> FloatImage:
+    """Alpha composite a colour, or another picture, over the picture (H, W, 3); `coverage` (H, W) is its alpha."""
     return np.asarray(picture + (np.asarray(colour, np.float32) - picture) * coverage[..., None], np.float32)
 
 
@@ -184,8 +184,8 @@ def _spline(count: int, pitch: float) -> NDArray[np.float64]:
 
 def _box(
     shape: tuple[int, ...], points: NDArray[np.float32], margin: float
-) -> tuple[slice, slice, Picture, Picture] | None:
-    """Rows, columns, x and y of the pixels round some points; None when they are all outside the picture."""
+) -> tuple[slice, slice, FloatImage, FloatImage] | None:
+    """Rows, columns, x and y of the pixels around some points; None where they are all outside the picture."""
     low, high = np.floor(points.min(axis=0) - margin).astype(int), np.ceil(points.max(axis=0) + margin).astype(int)
     left, top = np.maximum(low, 0).tolist()
     right, bottom = min(int(high[0]), shape[1]), min(int(high[1]), shape[0])

@@ -1,4 +1,4 @@
-"""The four sides of a subject as a draughtsman would draw them, with what each pixel shows."""
+"""Drawn pictures of a subject from its four sides, with labels, depths and texture coordinates of the pixels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIZE = 256
 """Pixels of a picture's edge; §4.3 works at this size."""
 
 SHRINK = 2
-"""Pictures are drawn this much larger, for smooth edges."""
+"""Factor by which pictures are drawn larger, for smooth edges."""
 
 EYES_APART = 0.43
 """Distance of an eye from the middle between them, relative to that of the eyes from the head's centre."""
@@ -30,7 +30,7 @@ MOUTH_BELOW = 0.95
 
 
 def draw_views(subject: Subject, rng: np.random.Generator) -> dict[str, NDArray[Any]]:
-    """picture (4, 256, 256, 3) uint8, labels (4, 256, 256) uint8, depth (4, 256, 256) float16 (VIEW z, -inf where
+    """Draw picture (4, 256, 256, 3) uint8, labels (4, 256, 256) uint8, depth (4, 256, 256) float16 (VIEW z, -inf where
     nothing), uv (4, 256, 256, 2) float16 (zeros where the body has no texture coordinates)."""
     materials = [*subject.rig.materials, "cloth.skirt"]
     colours = None
@@ -55,14 +55,14 @@ def draw_views(subject: Subject, rng: np.random.Generator) -> dict[str, NDArray[
 def view_layers(
     subject: Subject, view: int, raster: Raster, labels: NDArray[np.uint8]
 ) -> tuple[Layers, NDArray[np.float32]]:
-    """What the draughtsman sees, and the texture coordinates; bodies without any are patterned by their rest pose."""
+    """Layers of a view, and texture coordinates; bodies without any are patterned by their rest pose."""
     body, skirt = subject.vertices @ VIEWS[view].T, subject.skirt_vertices @ VIEWS[view].T
     vertices = np.concatenate([body, skirt])
     faces = np.concatenate([subject.rig.faces, subject.skirt_faces + len(body)])
     count = len(subject.rig.materials)
     material = np.concatenate([subject.rig.face_material.astype(np.int32), np.full(len(subject.skirt_faces), count)])
     normals = raster.blend(vertex_normals(vertices, faces), faces)
-    # The inside of a skirt is seen too, and its normals point away.
+    # The inside of a skirt is visible too, and its normals point away.
     normals = np.where(normals[..., 2:] < 0, -normals, normals)
     hanging = np.zeros((len(subject.skirt_faces), 3, 2), np.float32)
     real = _corner_blend(raster, np.concatenate([subject.uv, hanging]))
@@ -74,7 +74,7 @@ def view_layers(
 
 
 def _corner_blend(raster: Raster, corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(H, W, 2) a value of each face's corners (F, 3, 2), blended; zeros where nothing is seen."""
+    """(H, W, 2) values at the faces' corners (F, 3, 2), interpolated; zeros where no face is visible."""
     out = np.zeros((*raster.face.shape, 2), np.float32)
     seen = raster.mask
     out[seen] = np.einsum("nc,ncd->nd", raster.bary[seen], corners[raster.face[seen]])
@@ -84,7 +84,7 @@ def _corner_blend(raster: Raster, corners: NDArray[np.float32]) -> NDArray[np.fl
 def view_face(
     joints: NDArray[np.float64], corner: NDArray[np.float64], pitch: float, size: int = SIZE * SHRINK
 ) -> Face | None:
-    """Eyes and mouth in pixels of a picture of `size` pixels a side; None where the face looks away."""
+    """Eyes and mouth in pixels of a picture of edge `size`; None where the face is turned away."""
     head, eyes, neck = (joints[JOINT[name]] for name in ("head", "eyes", "neck"))
     forward = eyes - head
     reach = float(np.linalg.norm(forward))

@@ -15,13 +15,13 @@ VIEWS: tuple[NDArray[np.float64], ...] = tuple(axes(yaw) for yaw in VIEW_YAW_DEG
 
 
 SCENE = 448
-"""Pixels a side of the picture in which is decided what hides what."""
+"""Edge of the picture in which occlusion is decided, pixels."""
 
 
 def scene(
     subject: Subject, view: int, size: int = SCENE
 ) -> tuple[Raster, NDArray[np.uint8], NDArray[np.float64], float]:
-    """What is seen from one side: the raster of body and skirt, part labels, lower left corner and pixel's edge."""
+    """Rasterise one side: the raster of body and skirt, part labels, lower left corner and edge of a pixel."""
     body = subject.vertices @ VIEWS[view].T
     skirt = subject.skirt_vertices @ VIEWS[view].T
     vertices = np.concatenate([body, skirt])

@@ -1,4 +1,4 @@
-"""How a figure is drawn: inks, palettes, fills and cloth patterns, chosen once for all views of a body."""
+"""Styles of drawing: inks, palettes, fills and cloth patterns, chosen once for all views of a body."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ class Pattern:
 class Style:
     """One way to draw. Lengths are pixels of a picture of 256 pixels; pictures of other sizes scale them.
 
-    fill : how areas are filled; colours : (n_materials, 3) float32 0-255; patterns : one a material
+    fill : one of `FILLS`; colours : (n_materials, 3) float32 0-255; patterns : one per material
     ink : (3,) 0-255 colour of lines; width : of inner lines, 0 for none; outline : factor for the silhouette
-    wobble : how far lines stray; broken : share of the lines' length that is left out
-    joints : whether lines part limbs from each other where the cloth goes on
+    wobble : random displacement of lines; broken : share of the lines' length that is left out
+    joints : draw lines between limbs of the same cloth
     light : (3,) unit vector to the light, VIEW
-    background : one of `BACKGROUNDS`; glaze : whether the paper shines through the colours
+    background : one of `BACKGROUNDS`; glaze : let the paper show through the colours
     slip : (2,) offset of fills against lines, as in cheap prints; beard : "none", "full", "moustache" or "goatee"
     eyes : "dots", "ovals" or "open"
     softness : of the scan, standard deviation of a blur; speckle : of its noise, 0-255
@@ -95,7 +95,7 @@ class Style:
 
 
 def random_style(materials: Sequence[str], rng: np.random.Generator, colours: NDArray[Any] | None = None) -> Style:
-    """A style for a body made of `materials` ("skin", "hair", "hat", "shoe", "eye", "cloth.<piece>").
+    """Choose a style for a body of `materials` ("skin", "hair", "hat", "shoe", "eye", "cloth.<piece>").
 
     colours : (n_materials, 3) 0-255; None to choose them
     """
@@ -161,7 +161,7 @@ def palette(name: str, materials: Sequence[str], rng: np.random.Generator) -> ND
 
 
 def pattern_coverage(pattern: Pattern, uv: NDArray[np.float32], grain: float) -> NDArray[np.float32]:
-    """(H, W) 0-1, where a pattern's own colour lies.
+    """(H, W) 0-1, coverage by a pattern's own colour.
 
     uv : (H, W, 2) body texture coordinates; grain : UV units that one figure height takes
     """

@@ -14,8 +14,8 @@ Points = NDArray[np.float64]
 
 
 class Thing(NamedTuple):
-    """mask : (H, W) bool; label : part label; material : its name; front : whether it covers the body behind it;
-    spared : labels that stay before it"""
+    """mask : (H, W) bool; label : part label; material : its name; front : it covers the body behind it;
+    spared : labels that stay in front of it"""
 
     mask: NDArray[np.bool_]
     label: int
@@ -31,7 +31,7 @@ def polygon(shape: tuple[int, ...], points: Points) -> NDArray[np.bool_]:
 
 
 def smooth(points: Points, closed: bool = True, steps: int = 6) -> Points:
-    """A rounded line through points (Chaikin's corners cut)."""
+    """Round a line through points by Chaikin's corner cutting."""
     for _ in range(steps // 2):
         after = np.roll(points, -1, axis=0) if closed else points[1:]
         before = points if closed else points[:-1]
@@ -56,7 +56,7 @@ def at(joints: Points, *names: str) -> list[Points]:
     return [joints[JOINT[name], :2] for name in names]
 
 
-def tall_of(joints: Points) -> float:
+def body_length(joints: Points) -> float:
     """Length of the body along its bones, pixels."""
     head, pelvis, knee, ankle = at(joints, "head", "pelvis", "l_knee", "l_ankle")
     return float(np.linalg.norm(head - pelvis) * 1.3 + np.linalg.norm(pelvis - knee) + np.linalg.norm(knee - ankle))

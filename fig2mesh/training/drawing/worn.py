@@ -1,7 +1,7 @@
-"""What people wear and carry beyond their clothes: gowns, capes, long hair, hats, and things held in a hand.
+"""Things worn and carried beyond the clothes of the bodies: gowns, capes, long hair, hats, and things held in a hand.
 
 Each thing is a shape in the picture with a depth; it goes into the `Layers` of a drawn body as a material of its own,
-so that the draughtsman fills and outlines it as he does the body.
+so that it is filled and outlined like the body.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 from fig2mesh.skeleton import JOINT, LIMB_PARTS, PART, SIDES
 from fig2mesh.training.drawing.draw import Layers
 from fig2mesh.training.drawing.held import held
-from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, ellipse, line, polygon, smooth, tall_of
+from fig2mesh.training.drawing.thing_shapes import Points, Thing, at, body_length, ellipse, line, polygon, smooth
 
 SHARES: Final = {"gown": 0.14, "cape": 0.07, "hair": 0.14, "hat": 0.2, "held": 0.28, "pack": 0.06}
-"""How often each kind is worn or carried."""
+"""Kind → probability that it is worn or carried."""
 
 ARMS: Final = tuple(PART[f"{side}_{part}"] for side in SIDES for part in LIMB_PARTS["arm"])
 OVER, UNDER = 0.02, 0.4
-"""How far before what it covers, and how far behind the body, a thing lies, FIGURE units."""
+"""Distance of a thing in front of what it covers, and behind the body, FIGURE units."""
 
 
 def things(joints: Points, labels: NDArray[np.uint8], rng: np.random.Generator) -> list[Thing]:
-    """What a body wears and carries, at random.
+    """Choose at random the things that a body wears and carries.
 
     joints : (21, 3) x, y in pixels, z to the viewer in pixels; labels : (H, W) uint8 of the body
     """
@@ -39,7 +39,7 @@ def things(joints: Points, labels: NDArray[np.uint8], rng: np.random.Generator) 
 
 
 def put_on(layers: Layers, materials: list[str], worn: list[Thing]) -> tuple[Layers, list[str]]:
-    """The layers with things on; each adds a material."""
+    """Add things to the layers; each adds a material."""
     labels, material = layers.labels.copy(), layers.material.astype(np.int32)
     depth, normals = layers.depth.copy(), layers.normals.copy()
     names = list(materials)
@@ -70,7 +70,7 @@ def _bulge(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
 
 def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """A skirt from the waist, or a robe from the chest, to somewhere between knees and ground."""
-    tall = tall_of(joints)
+    tall = body_length(joints)
     pelvis, thorax = at(joints, "pelvis", "thorax")
     hips = np.stack(at(joints, "l_hip", "r_hip"))
     legs = np.stack(at(joints, "l_knee", "r_knee", "l_ankle", "r_ankle"))
@@ -106,7 +106,7 @@ def _gown(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> l
 
 def _cape(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """Cloth from the shoulders or the crown that hangs behind: capes, veils."""
-    tall = tall_of(joints)
+    tall = body_length(joints)
     left, right, pelvis, thorax, head = at(joints, "l_shoulder", "r_shoulder", "pelvis", "thorax", "head")
     down = (pelvis - thorax) / max(float(np.linalg.norm(pelvis - thorax)), 1.0)
     across = np.array([-down[1], down[0]])
@@ -194,7 +194,7 @@ def _hat(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> li
 def _pack(joints: Points, shape: tuple[int, ...], rng: np.random.Generator) -> list[Thing]:
     """A bag on the back: behind the body seen from the front, before it from behind."""
     thorax, pelvis = at(joints, "thorax", "pelvis")
-    tall, turned = tall_of(joints), joints[JOINT["eyes"], 2] < joints[JOINT["head"], 2]
+    tall, turned = body_length(joints), joints[JOINT["eyes"], 2] < joints[JOINT["head"], 2]
     side = joints[JOINT["head"], :2] - joints[JOINT["eyes"], :2]
     centre = (0.7 * thorax + 0.3 * pelvis) + np.array([np.sign(side[0]), 0]) * min(abs(side[0]), 0.1 * tall)
     box = rng.uniform(0.07, 0.13, 2) * tall * [1, 1.5]

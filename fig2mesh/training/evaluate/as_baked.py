@@ -1,7 +1,7 @@
-"""What the main job puts on unseen sides, on bodies whose true shape is known.
+"""Colours that a conversion bakes on unseen sides, on bodies whose true shape is known.
 
-The front of a `Subject` goes down the main job's road as far as colours go: split into layers, areas found, networks
-asked. Shapes stay the true ones, so that the result can be compared pixel by pixel.
+The front of a `TexturedSubject` goes through the stages of a conversion that decide colours: splitting into layers,
+finding areas, inference by networks. Shapes stay the true ones, so that results can be compared pixel by pixel.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from fig2mesh.parts.split import split
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import Figure
 from fig2mesh.skeleton import JOINT
+from fig2mesh.texture.majority import UnobservedPoints
 from fig2mesh.texture.sources import Sources, make_sources
 from fig2mesh.texture.space import inwards
-from fig2mesh.texture.unseen import LEAST_PX
-from fig2mesh.texture.votes import Unseen
-from fig2mesh.training.samples.textured_subject import Subject
+from fig2mesh.texture.unobserved import MIN_INNER_PX
+from fig2mesh.training.samples.textured_subject import TexturedSubject
 
 CANVAS_PX: Final = 512
 
-LEAST_DEEP: Final = 0.02
-"""Points this far behind what the front shows are not shown by it, units of depth."""
+MIN_DEPTH_GAP: Final = 0.02
+"""Points this far behind the visible surface of the front are not visible in it, units of depth."""
 
 TEXTURE: Final = 1024
 
 
-def baked_sides(subject: Subject, found: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(4, H, W, 3) 0-255, the colours that texels get at what each side shows.
+def baked_sides(subject: TexturedSubject, found: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(4, H, W, 3) 0-255, colours of the texels visible from each side.
 
-    found : (4, H, W, 2) where networks look for the colours, see `Sides.places`
+    found : (4, H, W, 2) positions in the front from which networks take the colours, see `Sides.places`
     """
     sides = subject.sides
     size = sides.labels.shape[1]
@@ -44,7 +44,7 @@ def baked_sides(subject: Subject, found: NDArray[np.floating]) -> NDArray[np.flo
     sources = _sources(subject, straight, _pixels(found, size))
     pixel = np.clip(straight.astype(int), 0, size - 1)
     depth = np.where(sides.labels[0] > 0, sides.points[0, ..., 2], -np.inf)
-    drawn = sides.points[..., 2] >= depth[pixel[..., 1], pixel[..., 0]] - LEAST_DEEP
+    drawn = sides.points[..., 2] >= depth[pixel[..., 1], pixel[..., 0]] - MIN_DEPTH_GAP
     drawn[2] = False
     result = sources.seen[pixel[..., 1], pixel[..., 0]]
     for label in np.unique(sides.shown[sides.shown > 0]):
@@ -56,11 +56,11 @@ def baked_sides(subject: Subject, found: NDArray[np.floating]) -> NDArray[np.flo
 
 
 def _pixels(places: NDArray[np.floating], size: int) -> NDArray[np.float64]:
-    """Places with edges at -1 and 1 as pixels."""
+    """Convert positions with edges at -1 and 1 to pixels."""
     return np.asarray((np.asarray(places, np.float64) + 1) / 2 * size)
 
 
-def _sources(subject: Subject, straight: NDArray[np.float64], found: NDArray[np.float64]) -> Sources:
+def _sources(subject: TexturedSubject, straight: NDArray[np.float64], found: NDArray[np.float64]) -> Sources:
     sides = subject.sides
     mask = sides.labels[0] > 0
     rgba = np.full((*mask.shape, 4), 255, np.uint8)
@@ -73,8 +73,8 @@ def _sources(subject: Subject, straight: NDArray[np.float64], found: NDArray[np.
     joints = lift(figure, frame).joints.astype(np.float64)
     divided = split(canvas, joints, visible)
     outline = Outline((), divided, raise_layers(canvas, divided, joints, "cpu"), canvas)
-    used = inwards(sides.labels > 0) > LEAST_PX
+    used = inwards(sides.labels > 0) > MIN_INNER_PX
     used[0] = False
     points, named = (frame.figure_from_image(pixels[used]).astype(np.float32) for pixels in (straight, found))
-    unseen = Unseen(sides.shown[used], points, named)
+    unseen = UnobservedPoints(sides.shown[used], points, named)
     return make_sources(figure, frame, outline, TEXTURE, 0, lambda picture: unseen)

@@ -1,4 +1,4 @@
-"""Whole figures against the truth: the drawing of a synthetic body goes down the road, what comes out is measured."""
+"""Whole figures against ground truth: synthetic bodies are drawn, their drawings converted, the results measured."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ PICTURE = 512
 """Pixels of the drawing's edge."""
 
 SAMPLES = 8_000
-"""Points a surface from which the chamfer distance is measured."""
+"""Points per surface from which the chamfer distance is measured."""
 
 SIDE_PIXEL = 0.006
-"""Of the silhouettes from the side, FIGURE units."""
+"""Pixel of the silhouettes from the side, FIGURE units."""
 
 TRUNK = {"head": (2,), "eyes": (2,), "neck": (1, 2), "thorax": (1,), "pelvis": (1,)}
-"""Joint of the trunk → parts that show it."""
+"""Joint of the trunk → parts on which it is visible."""
 
 
 @dataclass(frozen=True)
-class Truth:
-    """A synthetic body as FIGURE has it when its front is the drawing.
+class GroundTruth:
+    """A synthetic body in FIGURE, its front the drawing.
 
     figure : the drawing
     joints : (21, 3) float64, FIGURE
@@ -50,8 +50,8 @@ class Truth:
     normals: NDArray[np.float64]
 
 
-def truth_of(subject: Subject, seed: int = 0) -> Truth:
-    """The drawing of a subject's front and what is behind it; what hangs free of the body is not drawn."""
+def ground_truth(subject: Subject, seed: int = 0) -> GroundTruth:
+    """Draw a subject's front, and return it with the geometry; a skirt is not drawn."""
     bare = replace(subject, skirt_vertices=np.zeros((0, 3)), skirt_faces=np.zeros((0, 3), np.int32))
     _, labels, corner, pitch = scene(bare, 0, PICTURE)
     columns = (subject.joints[:, 0] - corner[0]) / pitch
@@ -74,17 +74,17 @@ def truth_of(subject: Subject, seed: int = 0) -> Truth:
     solids = {part.part: part.solid(subject.vertices * scale) for part in subject.parts}
     corners = (subject.vertices * scale)[subject.rig.faces]
     rng = np.random.default_rng(seed)
-    return Truth(figure, subject.joints * scale, solids, *_on_triangles(corners, rng))
+    return GroundTruth(figure, subject.joints * scale, solids, *_on_triangles(corners, rng))
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """How much a surface is like the true one.
+class Similarity:
+    """Similarity of a surface to the true one.
 
     chamfer : mean distance, both ways averaged, FIGURE units
     normals : mean cosine between normals at nearest points, both ways averaged
     side_iou : intersection over union of the silhouettes seen from the figure's left
-    shift : what was added to depths
+    shift : offset that was added to depths
     """
 
     chamfer: float
@@ -93,11 +93,11 @@ class Likeness:
     shift: float
 
 
-def likeness(body: Body, truth: Truth, spacing: float = 0.012) -> Likeness:
-    """A body against the truth.
+def similarity(body: Body, truth: GroundTruth, spacing: float = 0.012) -> Similarity:
+    """Compare a body with the ground truth.
 
-    A drawing says nothing of how far away its figure stands: it is shifted to where the medians of depth agree, and of
-    five places about that the one with the least chamfer distance is taken.
+    A drawing does not determine the distance of its figure: the body is shifted to where the medians of depth agree,
+    and of five shifts about that the one with the smallest chamfer distance is taken.
     """
     from scipy.spatial import cKDTree
 
@@ -116,11 +116,11 @@ def likeness(body: Body, truth: Truth, spacing: float = 0.012) -> Likeness:
         best = min(best, found)
     distance, normals, shift = best
     whole = np.concatenate([vertices[faces] for vertices, faces in truth.parts.values()])
-    return Likeness(distance, normals, _side_iou(corners + [0.0, 0.0, shift], whole), shift)
+    return Similarity(distance, normals, _side_iou(corners + [0.0, 0.0, shift], whole), shift)
 
 
 def _side_iou(made: NDArray[np.float64], true: NDArray[np.float64]) -> float:
-    """Of the silhouettes of two sets of triangles (N, 3, 3), looked at along x."""
+    """IoU of the silhouettes of two sets of triangles (N, 3, 3), seen along x."""
     import open3d
 
     tensor: Any = open3d.core.Tensor
@@ -138,8 +138,8 @@ def _side_iou(made: NDArray[np.float64], true: NDArray[np.float64]) -> float:
     return float((seen[0] & seen[1]).sum() / max(int((seen[0] | seen[1]).sum()), 1))
 
 
-def part_ious(parts: Any, truth: Truth, shift: float, nodes: int = 40) -> dict[int, float]:
-    """Intersection over union of each true part's solid and what was made of it, on a grid about both.
+def part_ious(parts: Any, truth: GroundTruth, shift: float, nodes: int = 40) -> dict[int, float]:
+    """Intersection over union of each true part's solid and the modelled one, on a grid about both.
 
     parts : `PartSdf` records; several of one label count together
     """
@@ -162,42 +162,44 @@ def part_ious(parts: Any, truth: Truth, shift: float, nodes: int = 40) -> dict[i
 
 
 @dataclass(frozen=True)
-class Measured:
-    """likeness : of the surface; ious : by part label."""
+class FigureScores:
+    """Scores of a whole figure; similarity : of the surface; ious : by part label."""
 
-    likeness: Likeness
+    similarity: Similarity
     ious: dict[int, float]
 
 
-ROADS = ("outline", "assembled", "plain union of the networks' parts")
-"""What is compared: the drawn outline and rules alone; the networks' depths in the drawn outline, as the main job has
-it; and the networks' parts put together as they are (paper §4.3)."""
+METHODS = ("outline", "assembled", "plain union of the networks' parts")
+"""Methods compared: the drawn outline and rules alone; the networks' depths in the drawn outline, as conversions do it;
+and the networks' parts united as they are (paper §4.3)."""
 
-GIVEN = "with true depths: "
-"""Prefix of the same roads for joints whose depths are given: how good shapes are, poses apart."""
+TRUE_DEPTHS = "with true depths: "
+"""Prefix of the same methods with given depths of the joints, which measure shapes without poses."""
 
 
-def measure_roads(pack: Pack, split: str, seed: int) -> dict[str, Measured]:
-    """One held-out figure down every road, with inferred and with true depths of its joints."""
+def measure_methods(pack: Pack, split: str, seed: int) -> dict[str, FigureScores]:
+    """Score one held-out figure by every method, with inferred and with true depths of its joints."""
     from fig2mesh.pose.network import lift_by_network
     from fig2mesh.pose.prior import lift
 
-    truth = truth_of(draw_subject(pack, split, seed))
+    truth = ground_truth(draw_subject(pack, split, seed))
     frame = image_frame(truth.figure)
     network = lift_by_network(truth.figure, frame)
     joints = network.joints.copy()
     joints[:, 2] = truth.joints[:, 2] - truth.joints[JOINT["pelvis"], 2]
-    made = _roads(truth, lift(truth.figure, frame), network)
-    made |= {GIVEN + road: body for road, body in _roads(truth, Pose3D(joints), Pose3D(joints)).items()}
+    made = _bodies_by_method(truth, lift(truth.figure, frame), network)
+    made |= {
+        TRUE_DEPTHS + method: body for method, body in _bodies_by_method(truth, Pose3D(joints), Pose3D(joints)).items()
+    }
     result = {}
-    for road, body in made.items():
-        found = likeness(body, truth)
-        result[road] = Measured(found, part_ious(body.parts, truth, found.shift))
+    for method, body in made.items():
+        found = similarity(body, truth)
+        result[method] = FigureScores(found, part_ious(body.parts, truth, found.shift))
     return result
 
 
-def _roads(truth: Truth, ruled: Pose3D, pose: Pose3D) -> dict[str, Body]:
-    """Bodies by road; the outline has joints by rule, the others have those of the network."""
+def _bodies_by_method(truth: GroundTruth, ruled: Pose3D, pose: Pose3D) -> dict[str, Body]:
+    """Bodies by method; "outline" has joints by rule, the others have those of the network."""
     from fig2mesh.parts.canvas import make_canvas
     from fig2mesh.parts.network import part_inference
     from fig2mesh.parts.outline import outline_parts
@@ -211,9 +213,9 @@ def _roads(truth: Truth, ruled: Pose3D, pose: Pose3D) -> dict[str, Body]:
     outline = outline_parts(canvas, ruled, seen, voxel=voxel)
     assembled = outline_parts(canvas, pose, seen, voxel=voxel, infer=infer)
     return {
-        ROADS[0]: Body(outline.parts, fillets=outline.fillets),
-        ROADS[1]: Body(assembled.parts, fillets=assembled.fillets),
-        ROADS[2]: Body(infer(canvas, divide(canvas, pose.joints.astype(np.float64), seen))),
+        METHODS[0]: Body(outline.parts, fillets=outline.fillets),
+        METHODS[1]: Body(assembled.parts, fillets=assembled.fillets),
+        METHODS[2]: Body(infer(canvas, divide(canvas, pose.joints.astype(np.float64), seen))),
     }
 
 

@@ -19,10 +19,10 @@ from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import JOINT_NAMES, PART_NAMES
 from fig2mesh.training.evaluate.parser import score
 from fig2mesh.training.samples.crop_data import load_crops
-from fig2mesh.training.samples.crop_views import View, Viewer
+from fig2mesh.training.samples.crop_views import CropView, CropViewer
 
 SIZE: Final = 256
-"""Pixels a side of the pictures."""
+"""Edge of the pictures, pixels."""
 
 SETS: Final = (
     ("bodies, unseen clips", "valid-clips", "bodies"),
@@ -30,11 +30,14 @@ SETS: Final = (
     ("doodles, unseen clips", "valid-clips", "doodles"),
 )
 
-Row = dict[str, float]
+CropScores = dict[str, float]
 
 
-def evaluate_crops(data: Path, count: int, blazepose: Path | None, say: Callable[[str], None]) -> str:
-    """A Markdown table; blazepose : TFLite file of BlazePose "heavy", which needs the package ai-edge-litert."""
+def evaluate_crops(data: Path, count: int, blazepose: Path | None, report: Callable[[str], None]) -> str:
+    """Return the scores as a Markdown table.
+
+    blazepose : TFLite file of BlazePose "heavy"; needs the package ai-edge-litert
+    """
     import cv2
 
     cv2.setNumThreads(1)
@@ -44,10 +47,14 @@ def evaluate_crops(data: Path, count: int, blazepose: Path | None, say: Callable
         "|---|---|---|---|---|---|---|",
     ]
     for title, split, kind in SETS:
-        viewer = Viewer(load_crops(data, split, kind, most=1), 1, grounds=60, size=SIZE)
+        viewer = CropViewer(load_crops(data, split, kind, limit=1), 1, backgrounds=60, size=SIZE)
         rng = np.random.default_rng(17)
         rows = np.linspace(0, len(viewer.crops) - 1, min(count, len(viewer.crops))).astype(int)
-        found: dict[str, list[Row]] = {"fig2mesh": [], "GrabCut, box given": [], "BlazePose heavy, box given": []}
+        found: dict[str, list[CropScores]] = {
+            "fig2mesh": [],
+            "GrabCut, box given": [],
+            "BlazePose heavy, box given": [],
+        }
         for row in rows:
             view = viewer.view(int(row), rng)
             mask = view.labels > 0
@@ -57,7 +64,7 @@ def evaluate_crops(data: Path, count: int, blazepose: Path | None, say: Callable
             found["GrabCut, box given"].append({"iou": _iou(_grabcut(view.picture, mask), mask)})
             if other is not None:
                 found["BlazePose heavy, box given"].append(_scores(view, mask, other(view.picture, mask)))
-        say(f"{title}: {len(found['fig2mesh'])} crops")
+        report(f"{title}: {len(found['fig2mesh'])} crops")
         for name, scores in found.items():
             if scores:
                 cells = [
@@ -69,7 +76,7 @@ def evaluate_crops(data: Path, count: int, blazepose: Path | None, say: Callable
     return "\n".join(lines) + "\n\n"
 
 
-def _scores(view: View, mask: BoolArray, found: Inference | None) -> Row:
+def _scores(view: CropView, mask: BoolArray, found: Inference | None) -> CropScores:
     joints = view.joints.astype(float) * SIZE
     if found is None:
         return {"iou": 0.0, "pck05": 0.0, "pck10": 0.0, "sides": 0.0}

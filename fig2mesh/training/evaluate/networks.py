@@ -1,6 +1,6 @@
-"""The paper's tables beside ours, on clips and people that training never saw; and whole figures against the outline.
+"""The paper's tables beside ours, on held-out clips and people; and whole figures against ground truth.
 
-Everything is measured here from weights and data; nothing is read from what training said of itself.
+Everything is measured here from weights and data; scores reported by training are not used.
 """
 
 from __future__ import annotations
@@ -22,28 +22,30 @@ from fig2mesh.training.evaluate.paper import PART_IOU, PART_RMSE, POSE_SCORES, V
 SPLITS: Final = ("valid-clips", "valid-characters")
 SPLIT_TITLE: Final = {"valid-clips": "held-out clips", "valid-characters": "held-out characters"}
 
-RULED: Final = 600
-"""Samples by which the rule without network is scored; it takes them one by one."""
+RULE_SAMPLES: Final = 600
+"""Number of samples on which the rule without network is scored; it takes them one by one."""
 
-Say = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much is measured: bodies a split for dense fields, figures a split for whole drawings."""
+    """Numbers of samples per split: bodies for dense fields, figures for whole drawings."""
 
     bodies: int = 32
     figures: int = 12
 
 
-def evaluate(pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(), say: Say = lambda line: None) -> str:
-    """The report as Markdown.
+def evaluate(
+    pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(), report: Report = lambda line: None
+) -> str:
+    """Return the report as Markdown.
 
     data : shards; runs : folder of trained runs besides the shipped weights, searched for networks of tables 1 and 2
     """
     sections = [
         "# Evaluation",
-        "Written by `fig2mesh evaluate networks`; [training.md](training.md) says how data and weights were made. "
+        "Written by `fig2mesh evaluate networks`; [training.md](training.md) describes data and training. "
         f"Part fields: {limits.bodies} bodies of each held-out split, each part from one of four sides, by turns; "
         f"whole figures: {limits.figures} of each.",
     ]
@@ -55,7 +57,7 @@ def evaluate(pack: Pack, data: Path, runs: Path | None, limits: Limits = Limits(
         ("Whole figures", lambda: _figure_table(pack, limits.figures)),
     )
     for title, make in made:
-        say(title)
+        report(title)
         sections += [f"## {title}", make()]
     return "\n\n".join(sections) + "\n"
 
@@ -119,13 +121,13 @@ def _pose_network(runs: Path | None, shape: PoseLiftShape) -> PoseLift | None:
 
 
 def _rule_scores(sample: Any) -> dict[str, float]:
-    """The same scores for the depth rule of the outline road."""
+    """The same scores for the depth rule of the outline method."""
     from fig2mesh.image_frame import ImageFrame
     from fig2mesh.pose.prior import lift
     from fig2mesh.records import Figure
 
     errors = []
-    arrays = (tensor.numpy()[:RULED] for tensor in (sample.drawn, sample.visible, sample.joints))
+    arrays = (tensor.numpy()[:RULE_SAMPLES] for tensor in (sample.drawn, sample.visible, sample.joints))
     for drawn, seen, truth in zip(*arrays, strict=True):
         blank = np.zeros((1, 1), np.uint8)
         figure = Figure("", np.zeros((1, 1, 4), np.uint8), blank > 0, drawn * [1, -1], seen, blank)
@@ -188,7 +190,7 @@ def _part_tables(data: Path, bodies: int) -> str:
 
 
 def _size_table(data: Path) -> str:
-    from fig2mesh.training.networks.train_size import Columns, read_sizes, size_scores
+    from fig2mesh.training.networks.train_size import SizeTensors, read_sizes, size_scores
 
     names = [f"{mask}_{what}_percent" for what in ("depth", "edge") for mask in ("whole", "seen", "none")]
     rows = []
@@ -196,7 +198,7 @@ def _size_table(data: Path) -> str:
         cells = []
         for split in SPLITS:
             scores = size_scores(
-                SIZE_WEIGHTS.shipped(SizeShape(kind)), Columns.of(read_sizes(data, split, kind), "cpu")
+                SIZE_WEIGHTS.shipped(SizeShape(kind)), SizeTensors.from_sizes(read_sizes(data, split, kind), "cpu")
             )
             cells += [f"{scores[name]:.1f}" for name in names]
         rows.append((kind.replace("_", " "), *cells))
@@ -208,20 +210,20 @@ def _size_table(data: Path) -> str:
 
 
 def _figure_table(pack: Pack, figures: int) -> str:
-    from fig2mesh.training.evaluate.assembled import GIVEN, ROADS, measure_roads
+    from fig2mesh.training.evaluate.assembled import METHODS, TRUE_DEPTHS, measure_methods
 
     rows, parts = [], []
     for split in SPLITS:
-        found = [measure_roads(pack, split, seed) for seed in range(figures)]
-        for road in (*ROADS, *(GIVEN + road for road in ROADS)):
-            results = [one[road] for one in found]
+        found = [measure_methods(pack, split, seed) for seed in range(figures)]
+        for method in (*METHODS, *(TRUE_DEPTHS + method for method in METHODS)):
+            results = [one[method] for one in found]
             rows.append(
                 (
-                    f"{SPLIT_TITLE[split]}: {road}",
-                    _spread([1000 * r.likeness.chamfer for r in results], ".1f"),
-                    f"{1000 * float(np.median([r.likeness.chamfer for r in results])):.1f}",
-                    f"{float(np.mean([r.likeness.normals for r in results])):.3f}",
-                    f"{100 * float(np.mean([r.likeness.side_iou for r in results])):.1f}",
+                    f"{SPLIT_TITLE[split]}: {method}",
+                    _spread([1000 * r.similarity.chamfer for r in results], ".1f"),
+                    f"{1000 * float(np.median([r.similarity.chamfer for r in results])):.1f}",
+                    f"{float(np.mean([r.similarity.normals for r in results])):.3f}",
+                    f"{100 * float(np.mean([r.similarity.side_iou for r in results])):.1f}",
                     f"{100 * float(np.mean([np.mean(list(r.ious.values())) for r in results])):.1f}",
                 )
             )
@@ -230,14 +232,14 @@ def _figure_table(pack: Pack, figures: int) -> str:
                 for part in BODY_PARTS:
                     by_kind[PART_KIND[part]].append(result.ious.get(part, np.nan))
             means = [f"{100 * float(np.nanmean(values)):.1f}" for values in by_kind.values()]
-            parts.append((f"{SPLIT_TITLE[split]}: {road}", *means))
+            parts.append((f"{SPLIT_TITLE[split]}: {method}", *means))
     text = (
         "Drawings of dressed bodies (front view; silhouette and 2D joints are given, depths are not) against the "
-        "bodies themselves, scaled to a drawn height of 1.79 m. A drawing does not say how far away a figure stands: "
+        "bodies themselves, scaled to a drawn height of 1.79 m. A drawing does not give the distance of its figure: "
         "it is shifted in depth to where it fits best. Chamfer: mean distance of the surfaces, both ways averaged; "
         "normals: mean cosine at nearest points, both ways; side IoU: of the silhouettes seen from the figure's left. "
         "With true depths: the joints' depths are given as well, so that only shape is measured."
     )
-    first = table(("road", "chamfer mm", "median mm", "normals", "side IoU %", "part IoU %"), rows)
+    first = table(("method", "chamfer mm", "median mm", "normals", "side IoU %", "part IoU %"), rows)
     second = table(("part IoU %", *(kind.replace("_", " ") for kind in KINDS)), parts)
     return f"{text}\n\n{first}\n\n{second}"

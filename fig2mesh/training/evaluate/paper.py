@@ -36,4 +36,4 @@ PART_IOU: Final = {
 """Kind → intersection over union in percent; table 3."""
 
 UV_SCORES: Final = {False: (0.014, 0.042), True: (0.011, 0.031)}
-"""Whether part masks are an input → MAE and RMSE of texture coordinates; table 4."""
+"""Part masks as an input → MAE and RMSE of texture coordinates; table 4."""

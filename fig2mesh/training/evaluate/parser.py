@@ -1,4 +1,4 @@
-"""How well figures are found in bare pictures: a folder of annotated drawings, transparency dropped."""
+"""Scores of the figure parser on a folder of annotated drawings without their transparency."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from fig2mesh.parse.picture import read_mask, read_view
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import JOINT, JOINT_MIRROR
 
-GROUNDS: Final = ("white", "hidden", "map")
-"""What is behind a transparent picture: white paper; whatever colours the file hides there; a made-up map."""
+BACKGROUNDS: Final = ("white", "hidden", "map")
+"""Backgrounds of transparent pictures: white paper; the hidden colours of the file; a drawn map."""
 
 PAIRS: Final = ("elbow", "wrist", "knee", "ankle")
 
 
 @dataclass(frozen=True)
 class Score:
-    """One drawing.
+    """Scores of one drawing.
 
     iou : of the silhouette; pck05, pck10 : share of visible joints within 0.05 and 0.1 of the figure's height
     sides : share of elbows, wrists, knees, ankles nearer to their own place than to their twin's
-    seen : share of joints whose visibility is told right; doubts : what the parser itself said
+    visibility : share of joints whose visibility is right; doubts : of the parser itself
     """
 
     name: str
@@ -38,22 +38,22 @@ class Score:
     pck05: float
     pck10: float
     sides: float
-    seen: float
+    visibility: float
     doubts: tuple[str, ...] = ()
 
 
-def evaluate_parse(folder: Path, say: Callable[[str], None] = lambda line: None) -> str:
-    """Markdown: a table of every drawing on white, and the means on each of `GROUNDS`."""
+def evaluate_parse(folder: Path, report: Callable[[str], None] = lambda line: None) -> str:
+    """Return Markdown: a table of every drawing on white, and the means on each of `BACKGROUNDS`."""
     found = drawings(folder)
-    by_ground = {}
-    for ground in GROUNDS:
-        say(f"{len(found)} drawings on {ground}")
-        by_ground[ground] = [measure(each, ground)[0] for each in found]
+    by_background = {}
+    for background in BACKGROUNDS:
+        report(f"{len(found)} drawings on {background}")
+        by_background[background] = [measure(each, background)[0] for each in found]
     lines = ["\n| transparent pictures on | silhouette IoU | PCK@0.05 | PCK@0.1 | sides |", "|---|---|---|---|---|"]
-    for ground, scores in by_ground.items():
+    for background, scores in by_background.items():
         mean = _mean(scores)
-        lines.append(f"| {ground} | {mean.iou:.3f} | {mean.pck05:.3f} | {mean.pck10:.3f} | {mean.sides:.3f} |")
-    return table(by_ground["white"]) + "\n".join(lines) + "\n"
+        lines.append(f"| {background} | {mean.iou:.3f} | {mean.pck05:.3f} | {mean.pck10:.3f} | {mean.sides:.3f} |")
+    return table(by_background["white"]) + "\n".join(lines) + "\n"
 
 
 def drawings(folder: Path) -> list[Path]:
@@ -70,13 +70,13 @@ def drawings(folder: Path) -> list[Path]:
     return found
 
 
-def measure(folder: Path, ground: str = "white") -> tuple[Score, Inference | None]:
-    """The score of one drawing, and what was found."""
+def measure(folder: Path, background: str = "white") -> tuple[Score, Inference | None]:
+    """Return the score of one drawing, and the inference."""
     view = read_view(folder / "image.png", None)
     rgba, mask = view.rgba, read_mask(folder / "mask.png", view)
     assert mask is not None  # a file was named
     truth = read_keypoints(folder / "keypoints.json")
-    found = infer_figure(bare(rgba, ground))
+    found = infer_figure(bare(rgba, background))
     if found is None:
         return Score(folder.name, 0.0, 0.0, 0.0, 0.0, 0.0, ("nothing found",)), None
     source = folder / "source.json"
@@ -88,7 +88,7 @@ def measure(folder: Path, ground: str = "white") -> tuple[Score, Inference | Non
 def score(
     name: str, found: Inference, mask: BoolArray, joints: NDArray[np.floating], visible: BoolArray, either: bool
 ) -> Score:
-    """What was found against the truth; either : left and right may be swapped."""
+    """Score an inference against ground truth; either : left and right may be swapped."""
     rows = np.flatnonzero(mask.any(axis=1))
     tall = float(rows[-1] - rows[0] + 1)
     both = float((mask & found.mask).sum()) / max(float((mask | found.mask).sum()), 1.0)
@@ -116,13 +116,13 @@ def score(
     )
 
 
-def bare(rgba: ByteArray, ground: str) -> ByteArray:
-    """(H, W, 3) the picture without transparency, on one of `GROUNDS`."""
-    if ground == "hidden" or (rgba[..., 3] == 255).all():
+def bare(rgba: ByteArray, background: str) -> ByteArray:
+    """(H, W, 3) picture without transparency, on one of `BACKGROUNDS`."""
+    if background == "hidden" or (rgba[..., 3] == 255).all():
         return np.ascontiguousarray(rgba[..., :3])
     alpha = rgba[..., 3:].astype(np.float32) / 255
     behind: Any = 255.0
-    if ground == "map":
+    if background == "map":
         from PIL import Image
 
         from fig2mesh.training.drawing.background import draw_background
@@ -134,7 +134,7 @@ def bare(rgba: ByteArray, ground: str) -> ByteArray:
 
 
 def table(scores: list[Score]) -> str:
-    """A Markdown table, the mean last."""
+    """Format scores as a Markdown table, the mean last."""
     lines = [
         "| figure | silhouette IoU | PCK@0.05 | PCK@0.1 | sides | visibility | the parser's own doubts |",
         "|---|---|---|---|---|---|---|",
@@ -142,7 +142,7 @@ def table(scores: list[Score]) -> str:
     for each in (*scores, _mean(scores)):
         lines.append(
             f"| {each.name} | {each.iou:.3f} | {each.pck05:.2f} | {each.pck10:.2f} | {each.sides:.2f} "
-            f"| {each.seen:.2f} | {'; '.join(each.doubts)} |"
+            f"| {each.visibility:.2f} | {'; '.join(each.doubts)} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -151,4 +151,4 @@ def _mean(scores: list[Score]) -> Score:
     def mean(name: str) -> float:
         return float(np.mean([getattr(each, name) for each in scores]))
 
-    return Score("mean", mean("iou"), mean("pck05"), mean("pck10"), mean("sides"), mean("seen"))
+    return Score("mean", mean("iou"), mean("pck05"), mean("pck10"), mean("sides"), mean("visibility"))

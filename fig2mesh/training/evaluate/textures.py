@@ -1,7 +1,7 @@
-"""Textures on bodies that training never saw: texture coordinates (table 4), and the sides that a drawing hides.
+"""Textures of held-out bodies: texture coordinates (table 4), and the sides that a drawing hides.
 
-The sides are made from the front picture alone and compared with what the draughtsman of the training data made of
-them. Shapes, labels and depths are the true ones, so that textures alone are measured.
+The sides are made from the front picture alone and compared with the drawn sides of the training data.
+Shapes, labels and depths are the true ones, so that textures alone are measured.
 """
 
 from __future__ import annotations
@@ -21,83 +21,83 @@ from fig2mesh.nets.uv_unet import SHIPPED, UV_WEIGHTS, UvUnetShape
 from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape
 from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
-from fig2mesh.texture.unseen import TextureNets, paint, shipped, texture_coordinates, unseen_changes
+from fig2mesh.texture.unobserved import TextureNets, paint, place_changes, shipped, texture_coordinates
 from fig2mesh.training.evaluate.as_baked import baked_sides
 from fig2mesh.training.evaluate.networks import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.evaluate.paper import UV_SCORES
 from fig2mesh.training.networks.train_uv import scores
 from fig2mesh.training.samples.texture_data import load_drawings
-from fig2mesh.training.samples.textured_subject import Subject, subjects
+from fig2mesh.training.samples.textured_subject import TexturedSubject, subjects
 
-Picture = NDArray[np.float32]
-Say = Callable[[str], None]
+FloatImage = NDArray[np.float32]
+Report = Callable[[str], None]
 
 # fmt: off
 BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
-    "as the main job bakes them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
+    "as conversions bake them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
     "coordinates, refined", "coordinates",
 )
 # fmt: on
 # fmt: off
 STRAIGHT, NEAREST, INPAINTED = (
-    "straight through the body", "nearest seen point", "OpenCV inpainting in texture space",
+    "straight through the body", "nearest observed point", "OpenCV inpainting in texture space",
 )
 # fmt: on
-ROADS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
-"""Ways to make unseen sides; the last three are baselines."""
+METHODS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
+"""Methods that make unseen sides; the last three are baselines."""
 
 PLACED: Final = (BAKED, DRAWN, COORDINATES, STRAIGHT)
-"""Ways that know where in the drawing each colour is from."""
+"""Methods that know the position in the drawing of each colour."""
 
 NEEDS_REFINER: Final = (DRAWN, HEADS, REFINED)
 
 COLOUR_WEIGHT: Final = 1.0
-"""Half pictures of distance that a difference between black and white is worth, in looking for a drawn colour."""
+"""Distance, in half pictures, that weighs as much as black against white in the search for a drawn colour."""
 
 UNCHANGED, UNLIKE = 30.0, 40.0
-"""Largest difference of a channel (0-255) between colours that are the same, and least between those that are not."""
+"""Maximum difference of a channel (0-255) between equal colours, and minimum between different ones."""
 
 TEXTURE: Final = 256
-"""Texels of an edge for inpainting colours."""
+"""Edge of the texture for inpainting, texels."""
 
 PALETTE: Final = 400
-"""Pixels of each picture whose colours are compared as palettes."""
+"""Number of pixels of each picture whose colours are compared as palettes."""
 
 
-def painted(subject: Subject, road: str, nets: TextureNets) -> tuple[Picture, Picture]:
-    """The sides as one way to make them has them, from the front picture alone.
+def painted(subject: TexturedSubject, method: str, nets: TextureNets) -> tuple[FloatImage, FloatImage]:
+    """Make the sides by one method, from the front picture alone.
 
     Returns
     -------
-    (4, H, W, 3) colours, 0-255; (4, H, W, 2) where in the front each is from, as far as that is known, edges at -1, 1
+    (4, H, W, 3) colours, 0-255; (4, H, W, 2) position of each in the front, as far as it is known, edges at -1, 1
     """
     sides, front = subject.sides, subject.front
     seen = sides.labels > 0
     straight = sides.places()
-    if road in (HEADS, REFINED):
-        return paint(sides, front, nets if road == HEADS else replace(nets, head=None)), straight
-    if road == STRAIGHT:
+    if method in (HEADS, REFINED):
+        return paint(sides, front, nets if method == HEADS else replace(nets, head=None)), straight
+    if method == STRAIGHT:
         return _sampled(front, straight), straight
-    if road == NEAREST:
+    if method == NEAREST:
         source = sides.points[0][seen[0]]
         _, index = cKDTree(source).query(sides.points[seen])
         result = np.zeros((*seen.shape, 3), np.float32)
         result[seen] = front[seen[0]][index]
         return result, straight
-    if road == INPAINTED:
+    if method == INPAINTED:
         return _inpainted(subject, nets), straight
-    found = straight + unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
-    if road == COORDINATES:
+    found = straight + place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    if method == COORDINATES:
         return _sampled(front, found), found
-    if road == BAKED:
+    if method == BAKED:
         return baked_sides(subject, found), straight
     return _in_drawn_colours(paint(sides, front, replace(nets, head=None)), found, front, seen)
 
 
 def _in_drawn_colours(
-    made: Picture, place: Picture, front: Picture, seen: NDArray[np.bool_]
-) -> tuple[Picture, Picture]:
-    """Colours replaced by those of drawn pixels that are most like them and near to where they were looked for."""
+    made: FloatImage, place: FloatImage, front: FloatImage, seen: NDArray[np.bool_]
+) -> tuple[FloatImage, FloatImage]:
+    """Replace colours by those of drawn pixels that are most similar and near the expected position."""
     size = front.shape[0]
     rows, columns = np.nonzero(seen[0])
     at = np.stack([columns + 0.5, rows + 0.5], axis=1) / size * 2 - 1
@@ -108,7 +108,7 @@ def _in_drawn_colours(
     return result, where
 
 
-def _sampled(front: Picture, place: NDArray[np.floating]) -> Picture:
+def _sampled(front: FloatImage, place: NDArray[np.floating]) -> FloatImage:
     size = front.shape[0]
     where = np.moveaxis((place[..., ::-1] + 1) / 2 * size - 0.5, -1, 0)
     return np.stack(
@@ -116,7 +116,7 @@ def _sampled(front: Picture, place: NDArray[np.floating]) -> Picture:
     ).astype(np.float32)
 
 
-def _inpainted(subject: Subject, nets: TextureNets) -> Picture:
+def _inpainted(subject: TexturedSubject, nets: TextureNets) -> FloatImage:
     """Colours of the front in texture space, the rest of the texture by `cv2.inpaint` after Telea 2004."""
     import cv2
 
@@ -130,11 +130,11 @@ def _inpainted(subject: Subject, nets: TextureNets) -> Picture:
     return np.asarray(texture[cell[..., 1], cell[..., 0]], np.float32)
 
 
-def compare(made: Picture, truth: Picture, mask: NDArray[np.bool_]) -> tuple[float, float, float]:
+def compare(made: FloatImage, truth: FloatImage, mask: NDArray[np.bool_]) -> tuple[float, float, float]:
     """PSNR in dB, SSIM and palette distance (CIELAB units) of one side inside of the body.
 
-    Palette distance: mean distance from a pixel's colour to the nearest colour of the other picture, both ways: what
-    colours there are, wherever they are.
+    Palette distance: mean distance from a pixel's colour to the nearest colour of the other picture, both ways: a
+    measure of the colours that does not depend on their positions.
     """
     from skimage.color import rgb2lab
     from skimage.metrics import structural_similarity
@@ -149,11 +149,11 @@ def compare(made: Picture, truth: Picture, mask: NDArray[np.bool_]) -> tuple[flo
     return float(psnr), float(similar[mask].mean()), float(apart) / 2
 
 
-def face_share(made: Picture, place: Picture, subject: Subject) -> tuple[float, float]:
-    """Shares of the head's pixels, seen from behind, that show what the drawing has in the face, and of those among
-    them where the truth is another colour.
+def face_share(made: FloatImage, place: FloatImage, subject: TexturedSubject) -> tuple[float, float]:
+    """Shares of the head's pixels, seen from behind, that have the drawing's colours of the face, and of those among
+    them where the ground truth is another colour.
 
-    place : where in the front the colours `made` are from, see `painted`
+    place : positions in the front of the colours `made`, see `painted`
     """
     back = subject.sides.labels[2] == PART["head"]
     if not back.any() or not subject.face.any():
@@ -167,16 +167,16 @@ def face_share(made: Picture, place: Picture, subject: Subject) -> tuple[float, 
     return float(shown.mean()), float((shown & wrong).mean())
 
 
-def evaluate_textures(data: Path, runs: Path | None, bodies: int, say: Say = lambda line: None) -> str:
-    """The report as Markdown; runs : folder of networks that are not shipped: without masks, and those that refine."""
-    say("Table 4: texture coordinates")
+def evaluate_textures(data: Path, runs: Path | None, bodies: int, report: Report = lambda line: None) -> str:
+    """Return the report as Markdown; runs : folder of networks that are not shipped: without masks, and refiners."""
+    report("Table 4: texture coordinates")
     sections = [
         "# Textures",
-        "Written by `fig2mesh evaluate textures`; [training.md](training.md) says how data and weights were made.",
+        "Written by `fig2mesh evaluate textures`; [training.md](training.md) describes data and training.",
         "## Table 4: texture coordinates",
         _uv_table(data, runs, bodies),
     ]
-    say("Unseen sides")
+    report("Unseen sides")
     sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs))]
     return "\n\n".join(sections) + "\n"
 
@@ -191,7 +191,7 @@ def _uv_table(data: Path, runs: Path | None, bodies: int) -> str:
             if net is None:
                 cells += ["not trained", ""]
                 continue
-            found = scores(net, load_drawings(data, (split,), pictures=False, most=bodies))
+            found = scores(net, load_drawings(data, (split,), pictures=False, limit=bodies))
             cells += [f"{found['mae']:.4f}", f"{found['rmse']:.4f}"]
         rows.append((title, *(f"{value:.3f}" for value in UV_SCORES[masks]), *cells))
     head = ["input", "paper MAE", "paper RMSE"]
@@ -201,7 +201,7 @@ def _uv_table(data: Path, runs: Path | None, bodies: int) -> str:
 
 
 def _networks(runs: Path | None) -> TextureNets:
-    """The shipped networks, and those that refine what they paint where they have been trained."""
+    """The shipped networks, and the refiners where they have been trained."""
     nets = shipped()
     refining, heads = (
         sorted(runs.rglob(name)) if runs is not None else []
@@ -217,25 +217,28 @@ def _networks(runs: Path | None) -> TextureNets:
 def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
     absent = {HEADS} if nets.head is None else set()
     absent |= set(NEEDS_REFINER) if nets.refine is None else set()
-    roads = [road for road in ROADS if road not in absent]
+    methods = [method for method in METHODS if method not in absent]
     rows, faces = [], []
     for split in SPLITS:
         chosen = subjects(data, split, bodies)
-        for road in roads:
+        for method in methods:
             found: dict[str, list[tuple[float, float, float]]] = {"back": [], "sides": []}
             shares = []
             for subject in chosen:
-                made, place = painted(subject, road, nets)
+                made, place = painted(subject, method, nets)
                 shares.append(face_share(made, place, subject))
                 for view in (1, 2, 3):
                     mask = subject.sides.labels[view] > 0
                     found["back" if view == 2 else "sides"].append(compare(made[view], subject.truth[view], mask))
             means = [np.mean(values, axis=0) for values in found.values()]
-            title = f"{SPLIT_TITLE[split]}: {road}"
+            title = f"{SPLIT_TITLE[split]}: {method}"
             rows.append((title, *(cell for m in means for cell in (f"{m[0]:.2f}", f"{m[1]:.3f}", f"{m[2]:.2f}"))))
-            if road in PLACED:
+            if method in PLACED:
                 faces.append((title, *(f"{100 * share:.1f}" for share in np.nanmean(shares, axis=0))))
-    head = ["way", *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette"))]
+    head = [
+        "method",
+        *(f"{side}: {what}" for side in ("back", "left and right") for what in ("PSNR", "SSIM", "palette")),
+    ]
     text = (
         f"{bodies} bodies a split; means over pictures of 256 x 256 pixels, inside of the body. Palette: mean distance "
         "to the nearest colour of the other picture, CIELAB units, both ways."
@@ -244,4 +247,4 @@ def _side_table(data: Path, bodies: int, nets: TextureNets) -> str:
         "Percent of the back of heads that shows what the drawing has between brows and chin, skin included; and as far"
         " as the truth has another colour there:"
     )
-    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('way', 'face', 'face, wrongly'), faces)}"
+    return f"{text}\n\n{table(head, rows)}\n\n{share}\n\n{table(('method', 'face', 'face, wrongly'), faces)}"

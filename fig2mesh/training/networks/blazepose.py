@@ -1,4 +1,4 @@
-"""BlazePose as the start of the figure parser: encoder and heat maps from a TFLite file.
+"""Initial weights of the figure parser from BlazePose: encoder and heat maps from a TFLite file.
 
 The file is `pose_landmark_full.tflite` of the package `@mediapipe/pose` (Apache-2.0, Google). Needs `tflite`, which
 reads the format's tables; the order of operators in the file is that of the layers here.
@@ -33,7 +33,7 @@ LANDMARKS: Final = {
 
 
 def start_from(net: FigureParser, path: Path) -> None:
-    """Give a parser the encoder of BlazePose, and its heat maps for the joints."""
+    """Copy the encoder of BlazePose, and its heat maps for the joints, into a parser."""
     found = _convolutions(path)
     maps = [pair for pair in found if len(pair[0]) == 39]
     try:

@@ -1,4 +1,4 @@
-"""Checkpoints of a training run: all that a run needs to go on as if it had not been interrupted."""
+"""Checkpoints of a training run: the state from which it resumes as if it had not been interrupted."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Argument = str | int | float | bool | None
 
 @dataclass
 class State:
-    """What changes from step to step, besides the model and the optimizer."""
+    """State that changes at each step, besides the model and the optimiser."""
 
     generator: torch.Generator
     averaged: dict[str, Tensor]
@@ -64,17 +64,17 @@ def resume(
     optimizer: torch.optim.Optimizer,
     state: State,
 ) -> None:
-    """Put the model, the optimizer and the state where the checkpoint in `folder` left them, if there is one."""
+    """Restore the model, the optimiser and the state from the checkpoint in `folder`, if there is one."""
     path = folder / CHECKPOINT
     if not path.exists():
         return
-    another = "give the same arguments to go on, or another folder to start again"
+    another = "give the same arguments to resume, or another folder to start again"
     device = next(model.parameters()).device
     try:
         found: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
         stored: dict[str, Argument] = found["arguments"]
     except Exception as error:
-        raise InputError(str(path), f"no readable checkpoint ({type(error).__name__})", "delete it") from None
+        raise InputError(str(path), f"not a readable checkpoint ({type(error).__name__})", "delete it") from None
     differing = [name for name in {**stored, **identity} if stored.get(name) != identity.get(name)]
     if differing:
         listed = ", ".join(f"{name} {stored.get(name)} there and {identity.get(name)} here" for name in differing)

@@ -1,7 +1,7 @@
-"""One loop that trains every network: seeded, resumable, and done when its budget is.
+"""Training loop of all networks: seeded, resumable, limited by a budget.
 
 The caller gives a function that turns the model and a generator into losses; the loop does the rest: mixed precision,
-gradients, learning rate, averaged weights, validation, `log.csv`, `curve.png` and a checkpoint a minute.
+gradients, learning rate, averaged weights, validation, `log.csv`, `curve.png` and a checkpoint every minute.
 
 Everything random follows from one `torch.Generator` (CPU) whose state is in the checkpoint; the global generators,
 which dropout uses, are reseeded from it before every step. So a step may draw from the generator given or, on its own
@@ -29,16 +29,16 @@ from fig2mesh.training.networks.run_log import CURVE, LOG, draw_curve, write_log
 from fig2mesh.training.networks.schedule import Schedule
 
 ROWS_A_VALIDATION = 10
-"""Rows of the log from one validation to the next."""
+"""Rows of the log per validation."""
 
 DRAW_S = 60.0
-"""Seconds from one drawing of the curve to the next; it costs half a second."""
+"""Interval between drawings of the curve, seconds; each takes half a second."""
 
 LAST_RATE = 0.01
-"""Share of the learning rate that the cosine ends at."""
+"""Share of the learning rate at the end of the cosine."""
 
 Step = Callable[[nn.Module, torch.Generator, float], Mapping[str, Tensor]]
-"""(model, generator, progress in [0, 1]) → scalar tensors; "loss" is what is minimised, the others are logged."""
+"""(model, generator, progress in [0, 1]) → scalar tensors; "loss" is minimised, the others are logged."""
 
 Validate = Callable[[], Mapping[str, float]]
 """() → scores of the model, which is in evaluation mode and has the averaged weights meanwhile."""
@@ -48,10 +48,10 @@ M = TypeVar("M")
 
 @dataclass(frozen=True)
 class Result:
-    """How a run ended; the model itself then has the averaged weights and is in evaluation mode.
+    """Outcome of a run; the model itself then has the averaged weights and is in evaluation mode.
 
-    steps, samples : done in all, over every resumption
-    seconds : spent in all
+    steps, samples : totals over all resumptions
+    seconds : total time
     metrics : the last row of the log, "valid_" before the names of the last validation
     """
 
@@ -62,21 +62,21 @@ class Result:
 
 
 def seeded(seed: int, make: Callable[[], M]) -> M:
-    """`make()` with the global generators seeded, and left as they were: for building a model."""
+    """Call `make` with the global generators seeded, and restore them: for building a model."""
     with torch.random.fork_rng():
         torch.manual_seed(seed)
         return make()
 
 
 @dataclass(frozen=True)
-class Task:
-    """A network and how it learns.
+class TrainingTask:
+    """A network, its optimiser, loss and validation.
 
     model, optimizer : on the device of the schedule
     step : loss of one batch
     validate : scores for the log; None for none
-    batch : samples a step, for the log
-    arguments : whatever else decides the result; a checkpoint with others is refused
+    batch : samples per step, for the log
+    arguments : everything else that affects the result; a checkpoint with others is refused
     """
 
     model: nn.Module
@@ -89,14 +89,14 @@ class Task:
 
 @dataclass(frozen=True)
 class Regime:
-    """What is the same for all runs of a network.
+    """Hyperparameters common to all runs of a network.
 
     warmup : steps over which the learning rate rises; then it falls as a cosine of the progress
-    ema : decay of the averaged weights, less at first; 0 for none
-    clip : largest norm of the gradients; None for any
+    ema : decay of the exponential moving average of the weights, less at first; 0 for none
+    clip : maximum norm of the gradients; None for no limit
     amp : compute in bfloat16 where that is safe; None to do so on CUDA alone
-    validations : their number over the whole run; the last comes at its end
-    checkpoint_s : seconds from one checkpoint to the next
+    validations : number over the whole run; the last is at its end
+    checkpoint_s : seconds between checkpoints
     """
 
     warmup: int = 100
@@ -108,14 +108,14 @@ class Regime:
 
 
 def run_loop(
-    task: Task,
+    task: TrainingTask,
     folder: Path,
     schedule: Schedule,
     regime: Regime = Regime(),
     *,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Result:
-    """Train a network until its time or steps are used up, going on from the checkpoint in `folder` if there is one."""
+    """Train a network until its time or steps are used up, resuming from the checkpoint in `folder` if there is one."""
     if schedule.budget_min is None and schedule.steps is None:
         raise ValueError("neither budget_min nor steps given")
     model, optimizer = task.model, task.optimizer

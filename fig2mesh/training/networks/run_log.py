@@ -19,7 +19,7 @@ SCORES = "scores.json"
 
 
 def write_log(path: Path, rows: list[dict[str, float]]) -> None:
-    """Write the rows as CSV, one column a name; replaced as a whole, so that no row of a lost step remains."""
+    """Write the rows as CSV, one column per name; replaced as a whole, so that no row of a lost step remains."""
     columns = list(dict.fromkeys(name for row in rows for name in row))
     with atomic_text(path) as stream:
         writer = csv.writer(stream, lineterminator="\n")
@@ -33,7 +33,7 @@ def write_scores(folder: Path, scores: Mapping[str, float]) -> None:
 
 
 def draw_curve(path: Path, rows: list[dict[str, float]]) -> None:
-    """Losses and scores over the steps; nothing is drawn where matplotlib is not installed."""
+    """Plot losses and scores over the steps; nothing is drawn without matplotlib."""
     try:
         import matplotlib
 

@@ -1,4 +1,4 @@
-"""How long a network is trained, and on what: the settings that all trainers share."""
+"""Budget, seed, batch, learning rate and device of a training run: the settings that all trainers share."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Schedule:
-    """Extent and conditions of one training run; the run ends with its minutes or its steps, whichever ends first.
+    """Settings of one training run; it ends with its minutes or its steps, whichever ends first.
 
     budget_min : minutes, those before an interruption included; None for no limit
-    steps : their number; None for no limit
+    steps : maximum number; None for no limit
     seed : of the network's first weights and of all that is drawn at random
-    batch : samples a step; None for as many as the network usually takes
-    rate : learning rate at its highest; None for the network's usual one
-    device : where the network is trained
+    batch : samples per step; None for the default of the network
+    rate : peak learning rate; None for the default of the network
+    device : "cpu" or "cuda"
     init : folder of an earlier run whose weights training starts from; None to start at random
     """
 
@@ -27,6 +27,6 @@ class Schedule:
     device: str = "cpu"
     init: Path | None = None
 
-    def usual(self, batch: int, rate: float) -> tuple[int, float]:
-        """Batch and learning rate, given those that a network usually has."""
+    def batch_and_rate(self, batch: int, rate: float) -> tuple[int, float]:
+        """Batch size and learning rate, given the defaults of a network."""
         return batch if self.batch is None else self.batch, rate if self.rate is None else self.rate

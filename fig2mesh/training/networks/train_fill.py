@@ -1,7 +1,7 @@
-"""Train the network that tells where in the drawing unseen texels take their colours, and score it.
+"""Train the network that predicts positions in the drawing from which unseen texels take their colours, and score it.
 
 Scores are over texels that the front does not show, weighted by how well other sides show them: PSNR of colours, and
-the same for colours taken straight through the body (`front_psnr`), which is what an untrained network gives.
+the same for colours taken straight through the body (`front_psnr`), the result of an untrained network.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape, TextureFill, sample
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
@@ -29,10 +29,10 @@ BATCH: Final = 8
 RATE: Final = 2e-3
 
 SEEN_WEIGHT: Final = 0.2
-"""Texels that the front shows count so much beside those it does not."""
+"""Weight of texels visible from the front; the others have 1."""
 
 COARSE: Final = 8
-"""Pixels of the front that are one in a second, coarse picture: its gradient tells of colours further away."""
+"""Downsampling factor of a second, coarse picture, whose gradient reaches colours further away."""
 
 SMOOTH: Final = 0.02
 OUTSIDE: Final = 0.1
@@ -43,14 +43,14 @@ def train_fill(
     out: Path,
     schedule: Schedule,
 ) -> dict[str, float]:
-    """Scores on the held-out splits; writes all that training leaves.
+    """Train a network; writes weights, log and scores to `out`, and returns the scores on the held-out splits.
 
-    Computes in bfloat16, which processors that have it do three times as fast.
+    Computes in bfloat16, which is three times as fast on processors that support it.
     """
-    batch, rate = schedule.usual(BATCH, RATE)
+    batch, rate = schedule.batch_and_rate(BATCH, RATE)
     device = schedule.device
     known = unfold(load_drawings(data, ("train",), pictures=True))
-    held = {split: unfold(load_drawings(data, (split,), pictures=True, most=24)) for split in HELD_OUT}
+    held = {split: unfold(load_drawings(data, (split,), pictures=True, limit=24)) for split in HELD_OUT}
     net = seeded(schedule.seed, lambda: TextureFill(FillShape(known.part.shape[-1]))).to(device)
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
@@ -62,7 +62,7 @@ def train_fill(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,
@@ -93,10 +93,10 @@ def train_fill(
 
 
 def losses(model: torch.nn.Module, texels: Texels) -> dict[str, Tensor]:
-    """Colours at the changed places against the truth, unevenness of the change, and places outside of the figure."""
+    """Loss: colour error at the predicted positions, roughness of the offsets, and positions outside the figure."""
     change = model(texels.inputs)
     place = texels.place + change
-    weight = texels.weight * torch.where(texels.seen, SEEN_WEIGHT, 1.0)
+    weight = texels.weight * torch.where(texels.observed, SEEN_WEIGHT, 1.0)
     total = weight.sum().clamp_min(1e-6)
     blurred = functional.avg_pool2d(texels.front, COARSE)
     fine, coarse = ((sample(picture, place) - texels.truth).abs().mean(dim=1) for picture in (texels.front, blurred))
@@ -111,12 +111,12 @@ def losses(model: torch.nn.Module, texels: Texels) -> dict[str, Tensor]:
 
 @torch.no_grad()
 def scores(net: TextureFill, bodies: Unfolded, device: str = "cpu") -> dict[str, float]:
-    """PSNR of unseen texels, dB, of the network and of places straight through the body."""
+    """PSNR of unseen texels, dB, of the network and of positions straight through the body."""
     sums = np.zeros(3)
     for first in range(0, len(bodies), BATCH):
         rows = np.arange(first, min(first + BATCH, len(bodies)))
         texels = Texels(*(t.to(device) for t in gather(bodies, rows)))
-        weight = texels.weight * ~texels.seen
+        weight = texels.weight * ~texels.observed
         for index, place in enumerate((texels.place + net(texels.inputs), texels.place)):
             error = (sample(texels.front, place) - texels.truth).square().mean(dim=1)
             sums[index] += float((error * weight).sum())

@@ -28,29 +28,29 @@ from fig2mesh.nets.figure_parser import (
     Parsed,
 )
 from fig2mesh.skeleton import JOINT
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
-from fig2mesh.training.samples.crop_data import KINDS, crops_digest, joined, load_crops
-from fig2mesh.training.samples.crop_views import Viewer
+from fig2mesh.training.samples.crop_data import KINDS, concatenate, crops_digest, load_crops
+from fig2mesh.training.samples.crop_views import CropViewer
 
 BATCH: Final = 8
 RATE: Final = 1e-3
 ENCODER_RATE: Final = 0.4
-"""The encoder learns at this share of the rate: it starts from other weights."""
+"""Learning rate of the encoder, as a share of the rate: it starts from pretrained weights."""
 
 SPREAD: Final = 0.9
-"""Spread of the target round a joint, cells of the heat map."""
+"""Standard deviation of the target around a joint, cells of the heat map."""
 
 GUESSED: Final = 0.35
-"""Weight of joints that the drawing hides, next to 1."""
+"""Weight of hidden joints; visible ones have 1."""
 
 DOODLES: Final = 0.42
-"""Share of doodles among what is trained on."""
+"""Share of doodles among training samples."""
 
 HELD_OUT: Final = ("valid-clips", "valid-characters")
 VIEWS = 64
-"""Views of each of these that are scored."""
+"""Number of views of each of these that are scored."""
 
 
 def train_parse(
@@ -63,13 +63,13 @@ def train_parse(
 ) -> dict[str, float]:
     """Train on the crops of `data`; weights, log and scores go to `out`.
 
-    blazepose : TFLite file for the encoder's start
-    whole : train the encoder's first stages and its filters too, which take half of the time and know edges already
+    blazepose : TFLite file with initial weights of the encoder
+    whole : train the encoder's first stages and its filters too, which takes twice the time and gains little
     """
     import cv2
 
     cv2.setNumThreads(1)
-    batch, rate = schedule.usual(BATCH, RATE)
+    batch, rate = schedule.batch_and_rate(BATCH, RATE)
     seed, init = schedule.seed, schedule.init
     net = seeded(seed, FigureParser)
     if blazepose is not None:
@@ -94,9 +94,9 @@ def train_parse(
     net = net.to(memory_format=torch.channels_last)
     parts = [load_crops(data, "train", kind) for kind in KINDS]
     bodies, doodles = (len(part) for part in parts)
-    viewer = Viewer(joined(*parts), seed)
+    viewer = CropViewer(concatenate(*parts), seed)
     parts.clear()
-    held = [Viewer(load_crops(data, split, most=1), seed + 1, grounds=40) for split in HELD_OUT]
+    held = [CropViewer(load_crops(data, split, limit=1), seed + 1, backgrounds=40) for split in HELD_OUT]
     views = [_fixed(viewer_, VIEWS) for viewer_ in held]
 
     def step(model: torch.nn.Module, generator: torch.Generator, progress: float) -> Mapping[str, Tensor]:
@@ -126,7 +126,7 @@ def train_parse(
         "start": None if blazepose is None else "BlazePose full (Apache-2.0)",
     }
     result = run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,
@@ -170,7 +170,7 @@ def collate(views: list[Any]) -> dict[str, Tensor]:
 
 
 def losses(found: Parsed, target: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """The loss and its terms."""
+    """Loss and its terms."""
     mask = (target["labels"] > 0).float()
     cross = functional.binary_cross_entropy_with_logits(found.silhouette, mask)
     share = found.silhouette.sigmoid()
@@ -192,21 +192,21 @@ def losses(found: Parsed, target: Mapping[str, Tensor]) -> dict[str, Tensor]:
 
 
 def heat_targets(joints: Tensor) -> Tensor:
-    """(N, 21, HEAT²) what a joint's map should hold: a bell round its place, 1 in sum. joints : (N, 21, 2) shares."""
+    """(N, 21, HEAT²) target heat maps: a Gaussian around each joint, of sum 1. joints : (N, 21, 2) shares."""
     cells = torch.arange(HEAT) + 0.5
     bell = [(-0.5 * ((joints[..., axis, None] * HEAT - cells) / SPREAD) ** 2).softmax(dim=2) for axis in (0, 1)]
     return (bell[1][..., :, None] * bell[0][..., None, :]).flatten(2)
 
 
-def _fixed(viewer: Viewer, count: int) -> dict[str, Tensor]:
-    """The same views every time."""
+def _fixed(viewer: CropViewer, count: int) -> dict[str, Tensor]:
+    """Collate `count` views that are the same every time."""
     rng = np.random.default_rng(5)
     rows = np.linspace(0, len(viewer.crops) - 1, count).astype(int)
     return collate([viewer.view(int(row), rng) for row in rows])
 
 
 def peaks(heat: Tensor) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Places (N, 21, 2) as shares of the picture, and the share of the map's mass near them (N, 21)."""
+    """Peak positions (N, 21, 2) as shares of the picture, and the share of the map's mass near them (N, 21)."""
     count, size = heat.shape[0], heat.shape[-1]
     share = heat.flatten(2).softmax(dim=2).reshape(count, JOINTS, size, size)
     near = functional.avg_pool2d(share, 5, 1, 2, count_include_pad=True) * 25
@@ -225,7 +225,7 @@ def peaks(heat: Tensor) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 @torch.no_grad()
 def score(net: FigureParser, target: Mapping[str, Tensor]) -> dict[str, float]:
-    """Scores of the network on views, by itself: no second look, no refinement."""
+    """Scores of the network alone on views: without a second pass or refinement."""
     parts = [net(chunk) for chunk in torch.split(target["picture"], 16)]
     found = Parsed(*(torch.cat(values) for values in zip(*parts, strict=True)))
     mask, own = target["labels"] > 0, found.silhouette > 0
@@ -254,7 +254,7 @@ def score(net: FigureParser, target: Mapping[str, Tensor]) -> dict[str, float]:
 
 
 def sides_right(found: NDArray[np.floating], joints: NDArray[np.floating]) -> float:
-    """Share of limbs (elbows, wrists, knees, ankles) nearer to their own place than to their twin's."""
+    """Share of limbs (elbows, wrists, knees, ankles) nearer to their own position than to their twin's."""
     right = []
     for name in ("elbow", "wrist", "knee", "ankle"):
         l, r = JOINT[f"l_{name}"], JOINT[f"r_{name}"]  # noqa: E741

@@ -1,9 +1,9 @@
 """Training and scoring of the part networks (paper §4.2, tables 2 and 3).
 
-A sample is one part in one of four views with one of three masks (whole, only what shows, none) and as many points
-inside as outside, drawn anew each time; the loss is the mean absolute error.
+A sample is one part in one of four views with one of three masks (whole, visible region, none) and as many points
+inside as outside, sampled again each time; the loss is the mean absolute error.
 
-Measured, batch 16 x 1024 points, processor time on one core with bfloat16 tiles, samples a second: two-stream with pose
+Measured, batch 16 x 1024 points, CPU time on one core with bfloat16 tiles, samples per second: two-stream with pose
 points 95 (single precision 34, by concatenation 20), one-stream with pose points 174.
 """
 
@@ -21,7 +21,7 @@ from torch import Tensor, nn
 
 from fig2mesh.nets.decode import decode, decode_dense
 from fig2mesh.nets.disn import PART_WEIGHTS, Disn, DisnShape, as_input
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
 from fig2mesh.training.samples.part_data import MIRROR, VIEWS, PartData, load_parts, swapped, turned, turned_grid
@@ -29,7 +29,7 @@ from fig2mesh.training.samples.part_data import MIRROR, VIEWS, PartData, load_pa
 MASK_MIX: Final = (0.45, 0.45, 0.10)
 """Shares of whole, visible and empty masks."""
 CHECKED: Final = 64
-"""Parts whose sampled points are scored during training."""
+"""Number of parts whose sampled points are scored during training."""
 
 BATCH: Final = 16
 RATE: Final = 2e-3
@@ -37,11 +37,11 @@ RATE: Final = 2e-3
 
 @dataclass(frozen=True)
 class PartSampling:
-    """What of the data a part network learns from and is scored on.
+    """Selection of the data for training and scoring a part network.
 
     points : points of each sample
     mask_mix : shares of whole, visible and empty masks
-    jitter : most standard deviation of the joints, PART units; each sample draws its own up to this
+    jitter : maximum standard deviation of the joints, PART units; each sample draws its own up to this
     max_bodies : bodies of the training split that are used; None for all
     validation_bodies : held-out bodies for the final scores
     """
@@ -64,7 +64,7 @@ def train_parts(
     epochs: int | None = None,
     ema: float = 0.999,
 ) -> dict[str, float]:
-    """Train one network on the shards in `data`, going on where an earlier call stopped; returns its scores.
+    """Train one network on the shards in `data`, resuming where an earlier call stopped; returns its scores.
 
     Writes log.csv, curve.png, checkpoint.pt and at last the weights, `PART_WEIGHTS.path(shape, out)`. The learning rate
     falls to a hundredth as a cosine.
@@ -73,7 +73,7 @@ def train_parts(
     """
     if kind != shape.kind:
         raise ValueError(f"kind: {kind}, but the network is for {shape.kind}")
-    batch, rate = schedule.usual(BATCH, RATE)
+    batch, rate = schedule.batch_and_rate(BATCH, RATE)
     points = sampling.points
     train = load_parts(data, kind, "train", max_bodies=sampling.max_bodies)
     held_out = bool(list(data.glob("valid*.npz")))
@@ -102,7 +102,7 @@ def train_parts(
     if epochs is not None:
         schedule = replace(schedule, steps=-(-epochs * VIEWS * len(train) // batch))
     result = run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,
@@ -148,7 +148,7 @@ def draw(
     jitter: float,
     device: str = "cpu",
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """A random batch: masks (B, 1, 64, 64), anchors (B, A, 3), points (B, N, 3) and their distances (B, N)."""
+    """Sample a batch: masks (B, 1, 64, 64), anchors (B, A, 3), points (B, N, 3) and their distances (B, N)."""
     items, views = chance.integers(len(parts), size=batch), chance.integers(VIEWS, size=batch)
     half = parts.points.shape[1] // 2
     inside = chance.integers(half, size=(batch, points // 2))
@@ -174,7 +174,7 @@ def draw(
 
 
 def sampled_scores(net: Disn, parts: PartData, points: int) -> dict[str, float]:
-    """Mean error and share of right signs at stored points of some parts, visible masks, views by turns."""
+    """Mean error and share of correct signs at stored points of some parts, visible masks, views by turns."""
     device = next(net.parameters()).device
     chosen = np.linspace(0, len(parts) - 1, min(CHECKED, len(parts))).astype(np.int64)
     views = np.arange(len(chosen)) % VIEWS
@@ -227,6 +227,6 @@ def evaluate_parts(
 
 
 def intersection_over_union(found: NDArray[np.bool_], truth: NDArray[np.bool_]) -> float:
-    """Share of the union that both hold; 1 where both are empty."""
+    """Intersection over union of two masks; 1 where both are empty."""
     union = np.count_nonzero(found | truth)
     return np.count_nonzero(found & truth) / union if union else 1.0

@@ -20,8 +20,8 @@ from torch import Tensor
 
 from fig2mesh.nets.pose_lift import POSE_WEIGHTS, PoseLift, PoseLiftShape, bone_lengths, lift
 from fig2mesh.skeleton import JOINT, JOINT_NAMES
-from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, View
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.bodies.skeletons import AROUND, DRAWN, SIDES, Sample, Sampler, Skeletons, ViewSampling
+from fig2mesh.training.networks.loop import Regime, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 
@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 BATCH: Final = 512
 RATE: Final = 1e-3
 COUNT: Final = 4096
-"""Samples that a score is the mean of."""
+"""Number of samples per score."""
 
 NEAR: Final = 0.150
-"""Distance up to which a joint counts as right, m (PCK150)."""
+"""Threshold on the distance of a correct joint, m (PCK150)."""
 
 VIEWS: Final = {"sides": SIDES, "around": AROUND, "drawn": DRAWN}
 """Protocols: the paper's four sides, all around, and as drawings are (`skeletons.DRAWN`)."""
@@ -50,12 +50,12 @@ def train_pose(
     augment: bool = True,
     dropout: float = 0.1,
 ) -> tuple[PoseLift, dict[str, float]]:
-    """The trained network and its scores on held-out poses and bodies; writes all that training leaves.
+    """Train a network; writes weights, log and scores to `out`, returns it with its scores on held-out skeletons.
 
-    dropout : of all hidden layers; Martinez et al. take a half
+    dropout : of all hidden layers; Martinez et al. use 0.5
     augment : train on drawings' proportions, views and errors, and not on the plain protocol of the paper
     """
-    batch, rate = schedule.usual(BATCH, RATE)
+    batch, rate = schedule.batch_and_rate(BATCH, RATE)
     view = replace(DRAWN if augment else AROUND, perspective=shape.perspective)
     sampler = Sampler(train, schedule.device)
     net = seeded(schedule.seed, lambda: PoseLift(shape, dropout)).to(schedule.device)
@@ -80,7 +80,7 @@ def train_pose(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,
@@ -114,8 +114,8 @@ def train_pose(
     return net, scores
 
 
-def _held(sampler: Sampler, view: View, shape: PoseLiftShape, count: int) -> Sample:
-    """The same samples for every network of a projection."""
+def _held(sampler: Sampler, view: ViewSampling, shape: PoseLiftShape, count: int) -> Sample:
+    """Draw samples that are the same for every network of a projection."""
     return sampler.draw(count, replace(view, perspective=shape.perspective), torch.Generator().manual_seed(1))
 
 
@@ -144,7 +144,7 @@ def pose_scores(net: PoseLift, sample: Sample) -> dict[str, float]:
 
 
 def pack_skeletons(pack: Pack, *, bodies: int = 256, seed: int = 0) -> tuple[Skeletons, Skeletons]:
-    """Training and held-out skeletons of a pack: other poses and other bodies; 70 % are realistic ones."""
+    """Training and held-out skeletons of a pack, with disjoint poses and characters; 70 % are realistic bodies."""
     from fig2mesh.training.bodies.anny_body import random_body
     from fig2mesh.training.bodies.pack import held_out
 

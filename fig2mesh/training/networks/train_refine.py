@@ -1,6 +1,6 @@
 """Train the networks that add details to painted sides: the whole side, and its head by the HSV autoencoder.
 
-Scores are over unseen sides: mean absolute error of colours 0-1, and the same for the painted sides as they went in.
+Scores are over unseen sides: mean absolute error of colours 0-1, and the same for the painted sides before refinement.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from fig2mesh.nets.head_hsv import HEAD_WEIGHTS, HeadHsv, HeadShape, disc_value,
 from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
 from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape, ViewRefine, refine, refine_inputs
 from fig2mesh.skeleton import PART
-from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, Result, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
-from fig2mesh.training.samples.painted import Painter, Sides, painters
+from fig2mesh.training.samples.painted import PaintedSides, Painter, painters
 from fig2mesh.training.samples.part_data import HELD_OUT
 
 BATCH: Final = 8
@@ -42,11 +42,11 @@ def train_refine(
     *,
     filters: int = RefineShape.filters,
 ) -> Scores:
-    """Scores on the held-out splits; writes all that training leaves.
+    """Train the refiner of sides; writes weights, log and scores to `out`, and returns the held-out scores.
 
     fill : folder with the weights of the network that paints the sides
     """
-    batch, _ = schedule.usual(BATCH, RATE)
+    batch, _ = schedule.batch_and_rate(BATCH, RATE)
     known, held = _painters(data, fill)
     net = seeded(schedule.seed, lambda: ViewRefine(RefineShape(filters)))
 
@@ -75,8 +75,8 @@ def train_head(
     *,
     shape: HeadShape = HeadShape(),  # noqa: B008 - frozen
 ) -> Scores:
-    """Scores on the held-out splits; writes all that training leaves."""
-    batch, _ = schedule.usual(HEADS, RATE)
+    """Train the autoencoder of heads; writes weights, log and scores to `out`, and returns the held-out scores."""
+    batch, _ = schedule.batch_and_rate(HEADS, RATE)
     known, held = _painters(data, fill)
     net = seeded(schedule.seed, lambda: HeadHsv(shape))
 
@@ -113,7 +113,7 @@ def picture_loss(found: Tensor, truth: Tensor, known: Tensor) -> Tensor:
 
 
 def head_losses(found: Tensor, truth: Tensor, there: Tensor) -> dict[str, Tensor]:
-    """Colour disc and value count alike (paper §4.4)."""
+    """Loss with equal weights of colour disc and value (paper §4.4)."""
     count = there.sum().clamp_min(1)
     colour = ((found[:, :2] - truth[:, :2]).abs().sum(dim=1) * there).sum() / (2 * count)
     value = ((found[:, 2] - truth[:, 2]).abs() * there).sum() / count
@@ -151,12 +151,12 @@ def _painters(data: Path, fill: Path) -> tuple[Painter, dict[str, Painter]]:
     return known, {split: painters(data, net, (split,), 16) for split in HELD_OUT}
 
 
-def _draw(painter: Painter, count: int, generator: torch.Generator) -> Sides:
+def _draw(painter: Painter, count: int, generator: torch.Generator) -> PaintedSides:
     rows = torch.randint(len(painter), (count,), generator=generator).numpy()
     return painter.sides(rows, 1 + torch.randint(3, (count,), generator=generator).numpy())
 
 
-def _heads(sides: Sides) -> Tensor:
+def _heads(sides: PaintedSides) -> Tensor:
     """(N, 9, 64, 64) painted, truth, texture coordinates and mask of the heads; nothing where there is none."""
     stack = torch.cat([sides.painted, sides.truth, sides.uv], dim=1)
     crops = []
@@ -171,7 +171,7 @@ def _heads(sides: Sides) -> Tensor:
 
 
 def _turned(disc: Tensor, angle: float) -> Tensor:
-    """Colours with another hue: paper §4.4 varies it too."""
+    """Rotate the hue of colours, as in paper §4.4."""
     x, y, value = disc.unbind(dim=1)
     cos, sin = math.cos(angle), math.sin(angle)
     return torch.stack([cos * x - sin * y, sin * x + cos * y, value], dim=1)
@@ -186,10 +186,10 @@ def _run(
     schedule: Schedule,
     batch: int,
 ) -> Result:
-    _, rate = schedule.usual(batch, RATE)
+    _, rate = schedule.batch_and_rate(batch, RATE)
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     return run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,

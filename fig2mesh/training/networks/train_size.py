@@ -1,7 +1,7 @@
-"""Train the perceptrons that tell a part's size, and score them on people and clips never seen.
+"""Train the perceptrons that predict a part's size, and score them on held-out people and clips.
 
 Scores are mean relative errors, |found / true - 1| in percent, of the width, height and depth of the part's box and of
-the edge of its cube: with the mask of the whole part, with the mask of what is seen, and without a mask.
+the edge of its cube: with the mask of the whole part, with the mask of its visible region, and without a mask.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.nets.part_size import OUTPUTS, SIZE_WEIGHTS, PartSizeNet, SizeShape, bone_unit
 from fig2mesh.records import _Checked
 from fig2mesh.skeleton import MIRRORED, PART_KIND, anchor_joints
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import read_shard, recipe_digest, shards
@@ -29,13 +29,13 @@ BATCH: Final = 512
 RATE: Final = 3e-3
 
 WHOLE, SEEN = 0.5, 0.3
-"""Shares of training samples with the mask of the whole part and of what is seen; the others have none."""
+"""Shares of training samples with the mask of the whole part and of its visible region; the others have none."""
 
 STRETCH: Final = 0.18
-"""Largest logarithm by which half of the samples are stretched along each axis."""
+"""Maximum logarithm of the factor by which half of the samples are stretched along each axis."""
 
 SHAKE: Final = (0.04, 0.04, 0.10)
-"""Largest errors (one sigma) of lifted joints, units of the bone: across the view, and in depth."""
+"""Maximum standard deviation of errors of lifted joints, units of the bone: x, y, depth."""
 
 NAMES: Final = ("width", "height", "depth", "edge")
 
@@ -46,7 +46,7 @@ class PartSizes(_Checked):
 
     anchors : (N, A, 3) float32, relative to the centre of the part's cube
     size : (N, 4) float32, width, height and depth of the part's box, and edge of its cube
-    whole, seen : (N, 2) float32, width and height of the part's mask, and of what is seen of it; zeros where nothing is
+    whole, seen : (N, 2) float32, width and height of the part's mask, and of its visible region; zeros where empty
     """
 
     anchors: NDArray[np.float32]
@@ -63,7 +63,7 @@ class PartSizes(_Checked):
 
 
 def read_sizes(data: Path, split: str, kind: str) -> PartSizes:
-    """The parts of a kind in all shards of a split."""
+    """Read the parts of a kind in all shards of a split."""
     columns: list[tuple[NDArray[np.float64], ...]] = []
     for path in shards(data, split):
         arrays = read_shard(path, ("joints", "centre", "edge", "size", "mask_amodal", "mask_visible"))
@@ -97,7 +97,7 @@ def mask_extent(packed: NDArray[np.uint8]) -> NDArray[np.float64]:
     return np.stack(result, axis=1)
 
 
-class Columns(NamedTuple):
+class SizeTensors(NamedTuple):
     """`PartSizes` as tensors."""
 
     anchors: Tensor
@@ -106,7 +106,7 @@ class Columns(NamedTuple):
     seen: Tensor
 
     @classmethod
-    def of(cls, sizes: PartSizes, device: str) -> Columns:
+    def from_sizes(cls, sizes: PartSizes, device: str) -> SizeTensors:
         arrays = (sizes.anchors, sizes.size, sizes.whole, sizes.seen)
         return cls(*(torch.tensor(array, device=device) for array in arrays))
 
@@ -117,13 +117,16 @@ def train_size(
     out: Path,
     schedule: Schedule,
 ) -> tuple[PartSizeNet, dict[str, float]]:
-    """The trained network of a kind and its scores on the held-out splits; writes all that training leaves."""
-    batch, rate = schedule.usual(BATCH, RATE)
+    """Train the network of a kind; writes weights, log and scores to `out`, returns it with the held-out scores."""
+    batch, rate = schedule.batch_and_rate(BATCH, RATE)
     device = schedule.device
-    known = Columns.of(read_sizes(data, "train", kind), device)
-    held = {split: Columns.of(read_sizes(data, split, kind), device) for split in ("valid-clips", "valid-characters")}
+    known = SizeTensors.from_sizes(read_sizes(data, "train", kind), device)
+    held = {
+        split: SizeTensors.from_sizes(read_sizes(data, split, kind), device)
+        for split in ("valid-clips", "valid-characters")
+    }
     net = seeded(schedule.seed, lambda: PartSizeNet(SizeShape(kind))).to(device)
-    # The middle of the data, so that training starts at sizes and not at bones.
+    # Start from the median size, not from the length of the bone.
     offset = (known.size / bone_unit(known.anchors)[:, None]).log().median(dim=0).values
     with torch.no_grad():
         last = net.layers[-1]
@@ -142,7 +145,7 @@ def train_size(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,
@@ -169,8 +172,8 @@ def train_size(
     return net, scores
 
 
-def _augmented(known: Columns, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Anchors, mask, size, and which samples' cube edges still hold.
+def _augmented(known: SizeTensors, count: int, generator: torch.Generator) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Augmented anchors, mask, size, and bool: samples whose cube edge is still valid.
 
     A body stretched along the axes of the view has boxes and masks stretched alike; the edge of a cube is only known
     where nothing was stretched.
@@ -190,8 +193,8 @@ def _augmented(known: Columns, count: int, generator: torch.Generator) -> tuple[
 
 
 @torch.no_grad()
-def size_scores(net: PartSizeNet, columns: Columns) -> dict[str, float]:
-    """Mean relative errors in percent, as the module's docstring says."""
+def size_scores(net: PartSizeNet, columns: SizeTensors) -> dict[str, float]:
+    """Mean relative errors in percent, as defined in the module's docstring."""
     net.eval()
     masks = {"whole": columns.whole, "seen": columns.seen, "none": torch.zeros_like(columns.whole)}
     result: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""Train the network that tells texture coordinates, and score it as table 4 does.
+"""Train the network that predicts texture coordinates, and score it as table 4 does.
 
 Scores are errors of u and v over the pixels of bodies that have texture coordinates: MAE and RMSE of both coordinates
 together, in texture units (0 to 1).
@@ -17,7 +17,7 @@ from torch.nn import functional
 
 from fig2mesh.nets.uv_unet import UV_WEIGHTS, UvUnet, UvUnetShape, uv_inputs
 from fig2mesh.skeleton import PART
-from fig2mesh.training.networks.loop import Regime, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.run_log import write_scores
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.samples.build import recipe_digest
@@ -29,11 +29,11 @@ RATE: Final = 2e-3
 MASK_WEIGHT: Final = 0.05
 
 HEAD_WEIGHT: Final = 2.0
-"""Of pixels of heads, whose errors put faces on their backs; others have 1."""
+"""Weight of pixels of heads, where errors put faces on the back; others have 1."""
 
 COARSE: Final = 0.03
-"""Depths of training are off by smooth errors of this size (one sigma), FIGURE units: inferred bodies are smoother
-than dressed ones and never quite as deep."""
+"""Standard deviation of smooth errors that are added to depths in training, FIGURE units: inferred
+bodies are smoother than dressed ones and never quite as deep."""
 
 Batch = tuple[Tensor, Tensor, Tensor, Tensor]
 """depth (N, H, W), labels (N, H, W), uv (N, 2, H, W), known (N, H, W)."""
@@ -45,14 +45,14 @@ def train_uv(
     schedule: Schedule,
     shape: UvUnetShape = UvUnetShape(),  # noqa: B008 - frozen
 ) -> dict[str, float]:
-    """Scores on the held-out splits; writes all that training leaves.
+    """Train a network; writes weights, log and scores to `out`, and returns the scores on the held-out splits.
 
-    Computes in bfloat16, which processors that have it do three times as fast.
+    Computes in bfloat16, which is three times as fast on processors that support it.
     """
-    batch, rate = schedule.usual(BATCH, RATE)
+    batch, rate = schedule.batch_and_rate(BATCH, RATE)
     device = schedule.device
     known = load_drawings(data, ("train",), pictures=False)
-    held = {split: load_drawings(data, (split,), pictures=False, most=24) for split in HELD_OUT}
+    held = {split: load_drawings(data, (split,), pictures=False, limit=24) for split in HELD_OUT}
     net = seeded(schedule.seed, lambda: UvUnet(shape)).to(device)
     before: dict[str, Any] = {}
     if schedule.init is not None:
@@ -72,7 +72,7 @@ def train_uv(
 
     optimizer = torch.optim.AdamW(net.parameters(), rate, weight_decay=1e-4)
     result = run_loop(
-        Task(
+        TrainingTask(
             net,
             optimizer,
             step,
@@ -108,7 +108,7 @@ def train_uv(
 
 
 def gather(drawings: Drawings, rows: np.ndarray, views: np.ndarray) -> Batch:
-    """Pictures of some bodies from some sides."""
+    """Gather bodies `rows` from sides `views` as a batch."""
     return (
         torch.from_numpy(drawings.depth[rows, views].astype(np.float32)),
         torch.from_numpy(drawings.labels[rows, views]),
@@ -142,7 +142,7 @@ def scores(net: UvUnet, drawings: Drawings, device: str = "cpu") -> dict[str, fl
 
 
 def _augmented(batch: Batch, generator: torch.Generator) -> Batch:
-    """Another size and place in the picture, smooth errors of the depth, some of them blurred as the paper's are."""
+    """Augment a batch: another size and position, smooth errors of the depth, some depths blurred as in the paper."""
     depth, labels, uv, known = batch
     count, size = len(depth), depth.shape[-1]
     scale = 1.0 + 0.25 * torch.rand(count, generator=generator)
@@ -163,7 +163,7 @@ def _augmented(batch: Batch, generator: torch.Generator) -> Batch:
 
 
 def _averaged(depth: Tensor, seen: Tensor) -> Tensor:
-    """(N, H, W) depths averaged over 5 x 5 pixels of what is seen (paper appendix B)."""
+    """(N, H, W) depths averaged over the visible of 5 x 5 pixels (paper appendix B)."""
     weight = seen.float()
     pair = torch.stack([depth * weight, weight], dim=1)
     total = functional.avg_pool2d(pair, 5, 1, 2)

@@ -1,4 +1,4 @@
-"""Write samples as shards: deterministic by seed, resumable, on as many processes as asked for."""
+"""Write samples as shards: deterministic by seed, resumable, in parallel."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from fig2mesh.training.bodies.subject import SPLITS, draw_subject
 from fig2mesh.training.samples.shard_jobs import make_shards
 
 SHARD = 50
-"""Bodies a shard of training data; validation shards with their dense grids hold `VALID_SHARD`."""
+"""Bodies per shard of training data; validation shards with their dense grids hold `VALID_SHARD`."""
 
 VALID_SHARD = 8
 RECIPE = "build.json"
 VERSION = 2
-"""Counts changes of what samples hold, so that data of an older recipe is not mixed with new."""
+"""Version of the content of samples, so that data of an older recipe is not mixed with new."""
 
 _PACK: dict[str, Pack] = {}
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """What samples are made of a pack.
+class BuildOptions:
+    """Number and content of the samples made from a pack.
 
     bodies : of the training split; valid : of each of the two held-out splits, with dense grids
-    seed : of all that is drawn at random
+    seed : of the random generators
     pictures : add drawn pictures, labels, depth and UV images (four views of each body), which cost most of the space
     shapes : add the parts' masks and distances, which cost most of the time; textures are learned without
     """
@@ -50,23 +50,23 @@ class Wanted:
 def build(
     pack: Path,
     out: Path,
-    wanted: Wanted = Wanted(),
+    options: BuildOptions = BuildOptions(),
     *,
     jobs: int = 1,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Make a folder of shards from a pack; what is there already, of the same recipe, is left as it is.
+    """Make a folder of shards from a pack; existing shards of the same recipe are kept.
 
-    report : called with shards done and wanted
+    report : called with the numbers of finished shards and of all shards
     """
-    seed, pictures, shapes = wanted.seed, wanted.pictures, wanted.shapes
+    seed, pictures, shapes = options.seed, options.pictures, options.shapes
     digest = hashlib.sha256(pack.read_bytes()).hexdigest() if pack.is_file() else ""
     load_pack(pack)
     recipe = {"version": VERSION, "pack": digest, "seed": seed, "pictures": pictures, "shapes": shapes}
     _check_recipe(out, recipe)
     tasks = []
     for split in SPLITS:
-        count, step = (wanted.bodies, SHARD) if split == "train" else (wanted.valid, VALID_SHARD)
+        count, step = (options.bodies, SHARD) if split == "train" else (options.valid, VALID_SHARD)
         for index, first in enumerate(range(0, count, step)):
             rows = range(first, min(first + step, count))
             path = out / f"{split}-{index:05d}.npz"
@@ -77,7 +77,7 @@ def build(
 
 
 def shards(data: Path, *splits: str) -> list[Path]:
-    """The shards of some splits in order; an error where there are none."""
+    """List the shards of some splits in order; an error where there are none."""
     found = [path for split in splits for path in sorted(data.glob(f"{split}-?????.npz"))]
     if not found:
         raise FigureError(data, f"holds no {' or '.join(splits)} data", "make it with: fig2mesh data build")
@@ -85,17 +85,17 @@ def shards(data: Path, *splits: str) -> list[Path]:
 
 
 def read_shard(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """Some arrays of a shard."""
+    """Read the named arrays of a shard."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             return {name: archive[name] for name in names}
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        found = f"no readable shard ({' '.join(str(error).split())[:80]})"
-        raise FigureError(path, found, "make it anew with: fig2mesh data build") from None
+        found = f"not a readable shard ({' '.join(str(error).split())[:80]})"
+        raise FigureError(path, found, "make it again with: fig2mesh data build") from None
 
 
 def recipe_digest(data: Path) -> str:
-    """What tells one folder of data from another: 16 hexadecimal digits of its recipe."""
+    """Identifier of a folder of data: 16 hexadecimal digits of its recipe's hash."""
     path = data / RECIPE
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16] if path.is_file() else ""
 

@@ -1,7 +1,7 @@
-"""A contact sheet of training data: what `fig2mesh data show` writes.
+"""A contact sheet of training data, as `fig2mesh data show` writes it.
 
-A row a body: its pictures from four sides, or the visible part masks put together where it has none; part labels and
-depth of the front; visible masks of some parts; its skeleton.
+One row per body: its pictures from four sides, or the visible part masks put together where it has none; part labels
+and depth of the front; visible masks of some parts; its skeleton.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from exporters.atomic_file import atomic_path
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.skeleton import BODY_PARTS, BONES, JOINT, PART
-from fig2mesh.training.drawing.marks import Picture, lay, stroke
+from fig2mesh.training.drawing.marks import FloatImage, lay, stroke
 
 TILE: Final = 112
-"""Pixels a side of one picture on the sheet."""
+"""Edge of one picture on the sheet, pixels."""
 REACH: Final = 1.15
-"""Half of what a tile without a frame of its own shows, FIGURE units, about the pelvis or the joints' middle."""
+"""Half the extent of a tile without a frame of its own, FIGURE units, about the pelvis or the joints' middle."""
 SHOWN: Final = ("torso", "head", "l_hand", "l_upper_leg", "r_foot")
 """The parts whose masks are shown."""
 EMPTY, PAPER, INK = 226.0, 250.0, (40.0, 40.0, 46.0)
 SIDE_INK: Final = {"l": (40.0, 80.0, 220.0), "r": (220.0, 50.0, 40.0)}
 
 FIELDS: Final = ("joints", "centre", "edge", "mask_amodal", "mask_visible", "picture", "labels", "depth")
-"""What the sheet shows; the first five must be there."""
+"""Arrays shown on the sheet; the first five are required."""
 REMEDY: Final = "make the data again with `fig2mesh data build`"
 
 Body = dict[str, NDArray[Any]]
@@ -40,7 +40,7 @@ def make_sheet(data: Path, out: Path, count: int = 24) -> Path:
     """Write a contact sheet (PNG) of bodies spread evenly over the training data.
 
     data : a shard (.npz), or the folder that holds shards
-    out : where to write; count : how many bodies at most
+    out : PNG file; count : maximum number of bodies
     """
     from PIL import Image
 
@@ -52,14 +52,12 @@ def make_sheet(data: Path, out: Path, count: int = 24) -> Path:
         with atomic_path(out) as partial:
             Image.fromarray(np.clip(np.rint(sheet), 0, 255).astype(np.uint8)).save(partial, format="PNG")
     except (OSError, ValueError) as error:
-        raise OutputError(
-            out, f"the sheet cannot be written ({error})", "name a .png file in a folder of yours"
-        ) from error
+        raise OutputError(out, f"cannot be written ({error})", "name a .png file in a writable folder") from error
     return out
 
 
 def part_colours() -> NDArray[np.float32]:
-    """(18, 3) float32 0-255, one a label: left parts cool, right parts warm, neighbours far apart."""
+    """(18, 3) float32 0-255, one per label: left parts cool, right parts warm, neighbours far apart."""
     colours = np.full((18, 3), PAPER, np.float32)
     colours[1:3] = (120, 170, 110), (232, 190, 90)
     for pair in range(6):
@@ -73,7 +71,7 @@ def part_colours() -> NDArray[np.float32]:
 
 
 def compose(centre: Any, edge: Any, masks: NDArray[np.uint8], view: str, size: int = TILE) -> NDArray[np.uint8]:
-    """(size, size) uint8 part labels of a view, put together from the parts' masks; `REACH` about the origin.
+    """(size, size) uint8 part labels of a view, composed from the parts' masks; `REACH` about the origin.
 
     centre : (14, 3), edge : (14,) FIGURE, front view; masks : (14, 64, 8) uint8, packed, of this view
     """
@@ -91,7 +89,7 @@ def compose(centre: Any, edge: Any, masks: NDArray[np.uint8], view: str, size: i
     return labels
 
 
-def _tiles(arrays: Body) -> list[Picture]:
+def _tiles(arrays: Body) -> list[FloatImage]:
     """(TILE, TILE, 3) pictures of one row."""
     colours = part_colours()
     visible = arrays["mask_visible"]
@@ -120,8 +118,8 @@ def _tiles(arrays: Body) -> list[Picture]:
     return tiles
 
 
-def _skeleton(picture: Picture, joints: NDArray[Any]) -> Picture:
-    """The picture of the front with the body's joints over it: left blue, right red."""
+def _skeleton(picture: FloatImage, joints: NDArray[Any]) -> FloatImage:
+    """Draw the body's joints over the picture of the front: left blue, right red."""
     scale = TILE / (2 * REACH)
     pixels = np.stack([(joints[:, 0] + REACH) * scale, (REACH - joints[:, 1]) * scale], axis=1)
     for start, end in BONES:
@@ -132,8 +130,8 @@ def _skeleton(picture: Picture, joints: NDArray[Any]) -> Picture:
     return picture
 
 
-def _depth(depth: NDArray[Any]) -> Picture:
-    """Near is light, far is dark, nothing is paper."""
+def _depth(depth: NDArray[Any]) -> FloatImage:
+    """Depth as grey: near is light, far is dark, nothing is paper."""
     depth = np.asarray(depth, np.float32)
     seen = np.isfinite(depth)
     grey = np.full(depth.shape, PAPER, np.float32)
@@ -143,8 +141,8 @@ def _depth(depth: NDArray[Any]) -> Picture:
     return _fit(np.repeat(grey[..., None], 3, axis=2))
 
 
-def _fit(picture: Picture) -> Picture:
-    """The picture at TILE x TILE: areas are averaged, so that thin lines stay."""
+def _fit(picture: FloatImage) -> FloatImage:
+    """Resize a picture to TILE x TILE by area averaging, so that thin lines stay."""
     for axis in (0, 1):
         count = picture.shape[axis]
         edges = np.linspace(0, count, TILE + 1)
@@ -159,7 +157,7 @@ def _fit(picture: Picture) -> Picture:
 
 
 def _bodies(data: Path, count: int) -> list[Body]:
-    """At most `count` bodies, spread evenly over the shards."""
+    """Read at most `count` bodies, spread evenly over the shards."""
     shards = sorted(data.glob("*-?????.npz")) if data.is_dir() else [data]
     sizes = []
     for shard in shards:
@@ -167,10 +165,10 @@ def _bodies(data: Path, count: int) -> list[Body]:
             with np.load(shard) as file:
                 sizes.append(len(file["joints"]))
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise InputError(shard, f"no training data can be read from it ({error})", REMEDY) from error
+            raise InputError(shard, f"not a readable shard of training data ({error})", REMEDY) from error
     total = sum(sizes)
     if not total or count < 1:
-        raise InputError(data, "it holds no bodies" if count > 0 else f"{count} bodies are asked for", REMEDY)
+        raise InputError(data, "no bodies in it" if count > 0 else f"{count} bodies requested", REMEDY)
     wanted = np.unique(np.linspace(0, total - 1, min(count, total)).astype(int))
     starts = np.cumsum([0, *sizes])
     out: list[Body] = []
@@ -180,6 +178,6 @@ def _bodies(data: Path, count: int) -> list[Body]:
             with np.load(shard) as file:
                 arrays = {name: file[name][rows] for name in FIELDS if name in file.files}
             if missing := [name for name in FIELDS[:5] if name not in arrays]:
-                raise InputError(shard, f"it has no {', '.join(missing)}", REMEDY)
+                raise InputError(shard, f"no {', '.join(missing)} in it", REMEDY)
             out += [{name: array[i] for name, array in arrays.items()} for i in range(len(rows))]
     return out

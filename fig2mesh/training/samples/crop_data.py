@@ -21,7 +21,7 @@ from fig2mesh.training.samples.shard_jobs import make_shards
 
 KINDS: Final = ("bodies", "doodles")
 BODIES, VIEWS, DOODLES = 40, 4, 160
-"""Bodies of a shard and drawings of each; doodles of a shard."""
+"""Bodies per shard, drawings per body; doodles per shard."""
 
 RECIPE: Final = "crops.json"
 VERSION: Final = 1
@@ -32,7 +32,7 @@ _PACK: dict[str, Pack] = {}
 
 @dataclass(frozen=True)
 class Crops:
-    """N crops, see `training.crops.Crop`.
+    """N crops, see `training.drawing.crop.Crop`.
 
     rgba : (N, 256, 256, 4) uint8; labels : (N, 256, 256) uint8; joints : (N, 21, 2) float32; visible : (N, 21) bool
     """
@@ -57,10 +57,10 @@ def build_crops(
     jobs: int = 1,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Make a folder of crops from a pack; shards that are there already are left as they are.
+    """Make a folder of crops from a pack; existing shards are kept.
 
-    bodies : of the training split, `VIEWS` drawings each; doodles : figures of lines and blobs to train on
-    valid : bodies of each held-out split, and twice as many doodles of poses never trained on
+    bodies : of the training split, `VIEWS` drawings each; doodles : figures of lines and blobs for training
+    valid : bodies of each held-out split, and twice as many doodles of held-out poses
     """
     load_pack(pack)
     recipe = {"version": VERSION, "pack": hashlib.sha256(pack.read_bytes()).hexdigest(), "seed": seed}
@@ -81,12 +81,12 @@ def build_crops(
     make_shards(_shard, tasks, jobs, report)
 
 
-def load_crops(data: Path, split: str, kind: str = "*", most: int | None = None) -> Crops:
-    """All crops of a split, or the first `most` shards of each kind."""
+def load_crops(data: Path, split: str, kind: str = "*", limit: int | None = None) -> Crops:
+    """Read all crops of a split, or the first `limit` shards of each kind."""
     names = [k for k in KINDS if kind in ("*", k)]
-    found = [path for k in names for path in sorted(data.glob(f"{k}-{split}-?????.npz"))[:most]]
+    found = [path for k in names for path in sorted(data.glob(f"{k}-{split}-?????.npz"))[:limit]]
     if not found:
-        raise FigureError(data, f"holds no crops of {split}", "make them with: fig2mesh data crops")
+        raise FigureError(data, f"no crops of {split} in it", "make them with: fig2mesh data crops")
     columns: dict[str, list[Any]] = {name: [] for name in FIELDS}
     for path in found:
         for name, value in read_shard(path, FIELDS).items():
@@ -94,13 +94,13 @@ def load_crops(data: Path, split: str, kind: str = "*", most: int | None = None)
     return Crops(**{name: np.concatenate(values) for name, values in columns.items()})
 
 
-def joined(*parts: Crops) -> Crops:
-    """All of them, in order."""
+def concatenate(*parts: Crops) -> Crops:
+    """Concatenate sets of crops, in order."""
     return Crops(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS})
 
 
 def crops_digest(data: Path) -> str:
-    """What tells one folder of crops from another: 16 hexadecimal digits of its recipe and its shards' names."""
+    """Identifier of a folder of crops: 16 hexadecimal digits of the hash of its recipe and its shards' names."""
     path = data / RECIPE
     names = "".join(sorted(shard.name for shard in data.glob("*-train-?????.npz")))
     return hashlib.sha256((path.read_bytes() if path.is_file() else b"") + names.encode()).hexdigest()[:16]

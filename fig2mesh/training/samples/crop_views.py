@@ -1,4 +1,4 @@
-"""What the figure parser is trained on: crops turned, placed on grounds, coloured, worn and scanned at random."""
+"""Augmentation for the figure parser: crops turned, placed on backgrounds, coloured, aged and scanned at random."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from fig2mesh.training.drawing.background import draw_background
 from fig2mesh.training.samples.crop_data import Crops
 
 OTHER_SIDE: Final = np.array(PART_MIRROR, np.uint8)
-"""`PART_MIRROR`, to look up label pictures in."""
+"""`PART_MIRROR` as a lookup table for label pictures."""
 
 MAPS: Final = ("coast", "realms", "fields", "town", "paper", "coast", "town", "paper")
 
 
-class View(NamedTuple):
-    """picture : (size, size, 3) uint8; labels : (size, size) uint8; joints : (21, 2) float32, shares of the picture;
-    visible, inside : (21,) bool"""
+class CropView(NamedTuple):
+    """View of a crop.
+
+    picture : (size, size, 3) uint8; labels : (size, size) uint8; joints : (21, 2) float32, shares of the picture
+    visible, inside : (21,) bool
+    """
 
     picture: NDArray[np.uint8]
     labels: NDArray[np.uint8]
@@ -30,30 +33,30 @@ class View(NamedTuple):
     inside: NDArray[np.bool_]
 
 
-class Viewer:
-    """Makes views of crops.
+class CropViewer:
+    """Generator of views of crops.
 
-    size : pixels a side of a view; grounds : how many maps and papers are drawn to choose from
+    size : edge of a view, pixels; backgrounds : number of maps and papers that are drawn to choose from
     """
 
-    def __init__(self, crops: Crops, seed: int = 0, grounds: int = 160, size: int = INPUT) -> None:
+    def __init__(self, crops: Crops, seed: int = 0, backgrounds: int = 160, size: int = INPUT) -> None:
         self.crops, self.size = crops, size
         rng = np.random.default_rng([23, seed])
-        self.grounds = np.stack(
+        self.backgrounds = np.stack(
             [
                 np.clip(draw_background(MAPS[index % len(MAPS)], (256, 256), rng), 0, 255).astype(np.uint8)
-                for index in range(grounds)
+                for index in range(backgrounds)
             ]
         )
 
-    def view(self, index: int, rng: np.random.Generator) -> View:
-        """Crop `index` as it may be met."""
+    def view(self, index: int, rng: np.random.Generator) -> CropView:
+        """Augment crop `index`."""
         crops = self.crops
         rgba, labels = crops.rgba[index], crops.labels[index]
         joints, visible = crops.joints[index].astype(np.float64), crops.visible[index]
         baked = bool((rgba[::16, ::16, 3] == 255).all())
         size = (self.size, self.size)
-        matrix = _placing(labels, self.size, rng)
+        matrix = _placement(labels, self.size, rng)
         if baked:
             reduced = float(np.abs(np.linalg.det(matrix[:, :2]))) < 0.3
             border = rgba[..., :3].reshape(-1, 3)[rng.integers(256)].tolist()
@@ -66,10 +69,10 @@ class Viewer:
                 borderValue=border,
             ).astype(np.float32)
         else:
-            picture = self._ground(rng)
+            picture = self._background(rng)
             if rng.random() < 0.22:
                 picture = self._neighbour(picture, rng)
-            picture = _pasted(_decorated(picture, joints, matrix, rng), rgba, matrix, rng)
+            picture = _composited(_decorated(picture, joints, matrix, rng), rgba, matrix, rng)
         labels = cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST)
         joints = (joints - 0.5) @ matrix[:, :2].T + matrix[:, 2] + 0.5
         if rng.random() < 0.5:
@@ -78,15 +81,15 @@ class Viewer:
             visible = visible[list(JOINT_MIRROR)]
         share = (joints / self.size).astype(np.float32)
         inside = ((share > 0) & (share < 1)).all(axis=1)
-        return View(
-            scanned(np.ascontiguousarray(picture, np.float32), rng),
+        return CropView(
+            simulate_scan(np.ascontiguousarray(picture, np.float32), rng),
             np.ascontiguousarray(labels),
             share,
             visible & inside,
             inside,
         )
 
-    def _ground(self, rng: np.random.Generator) -> NDArray[np.float32]:
+    def _background(self, rng: np.random.Generator) -> NDArray[np.float32]:
         kind = rng.random()
         if kind < 0.36:
             return np.full((self.size, self.size, 3), 255 if rng.random() < 0.85 else rng.uniform(225, 255), np.float32)
@@ -97,7 +100,7 @@ class Viewer:
                 y, x = np.mgrid[: self.size, : self.size].astype(np.float32) / self.size
                 out = out * (1 + rng.normal(0, 0.12) * (x - 0.5) + rng.normal(0, 0.12) * (y - 0.5))[..., None]
             return np.clip(out, 0, 255)
-        ground = self.grounds[int(rng.integers(len(self.grounds)))]
+        ground = self.backgrounds[int(rng.integers(len(self.backgrounds)))]
         zoom = rng.uniform(0.75, 2.2)
         matrix = cv2.getRotationMatrix2D((128, 128), float(rng.uniform(-180, 180)), zoom)
         matrix[:, 2] += self.size / 2 - 128 + rng.uniform(-40, 40, 2)
@@ -105,7 +108,7 @@ class Viewer:
         return np.asarray(moved, np.float32)
 
     def _neighbour(self, picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.float32]:
-        """Another figure at the rim."""
+        """Add another figure at the rim."""
         other = self.crops.rgba[int(rng.integers(len(self.crops)))]
         if (other[::16, ::16, 3] == 255).all():
             return picture
@@ -114,11 +117,11 @@ class Viewer:
         where = (
             self.size / 2 + self.size * rng.uniform(0.62, 0.8) * np.array([np.cos(angle), np.sin(angle)]) - 128 * scale
         )
-        return _pasted(picture, other, np.array([[scale, 0, where[0]], [0, scale, where[1]]]), rng)
+        return _composited(picture, other, np.array([[scale, 0, where[0]], [0, scale, where[1]]]), rng)
 
 
-def _placing(labels: NDArray[np.uint8], size: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """(2, 3) from a crop's pixels to the picture's: turned, scaled, moved; at times so that the figure is cut off."""
+def _placement(labels: NDArray[np.uint8], size: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """(2, 3) random affine map from a crop's pixels to the picture's; at times the figure is cut off."""
     rows, columns = np.flatnonzero((labels > 0).any(axis=1)), np.flatnonzero((labels > 0).any(axis=0))
     centre = np.array([columns[0] + columns[-1], rows[0] + rows[-1]]) / 2
     angle = float(np.radians(np.clip(rng.normal(0, 12), -35, 35))) if rng.random() < 0.6 else 0.0
@@ -138,7 +141,7 @@ def _placing(labels: NDArray[np.uint8], size: int, rng: np.random.Generator) -> 
     return matrix
 
 
-def _pasted(
+def _composited(
     picture: NDArray[np.float32], rgba: NDArray[np.uint8], matrix: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.float32]:
     alpha = rgba[..., 3:].astype(np.float32) / 255
@@ -155,7 +158,7 @@ def _pasted(
 def _decorated(
     picture: NDArray[np.float32], joints: NDArray[np.float64], matrix: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.float32]:
-    """What stands round figures and is none of them: shadows, ground lines, frames, bases, a letter's stroke."""
+    """Draw things that surround figures: shadows, ground lines, frames, bases."""
     size = picture.shape[0]
     feet = (joints[[17, 18, 19, 20]] @ matrix[:, :2].T + matrix[:, 2]).mean(axis=0)
     ink = rng.uniform(0, 200, 3).tolist()
@@ -187,8 +190,8 @@ def _decorated(
     return picture
 
 
-def scanned(picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.uint8]:
-    """The picture as printed, faded, photographed, scanned and packed."""
+def simulate_scan(picture: NDArray[np.float32], rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Degrade a picture as by printing, fading, photography, scanning and compression."""
     size = picture.shape[0]
     if rng.random() < 0.5:
         gain, lift = rng.uniform(0.7, 1.25), rng.normal(0, 12)

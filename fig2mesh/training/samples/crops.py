@@ -14,7 +14,7 @@ from fig2mesh.skeleton import JOINT, PART
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.subject import Subject, draw_subject
 from fig2mesh.training.drawing.background import draw_background
-from fig2mesh.training.drawing.crop import MARGIN, ROOM, Crop, cut, seen_joints
+from fig2mesh.training.drawing.crop import MARGIN, ROOM, Crop, cut, visible_joints
 from fig2mesh.training.drawing.draw import Layers, draw
 from fig2mesh.training.drawing.pictures import view_face, view_layers
 from fig2mesh.training.drawing.raster import rasterise
@@ -22,7 +22,7 @@ from fig2mesh.training.drawing.styles import random_style
 from fig2mesh.training.drawing.worn import put_on, things
 
 DRAWN: Final = 320
-"""Pixels a side of the picture that a crop is cut from."""
+"""Edge of the picture that a crop is cut from, pixels."""
 
 FILL: Final = 0.72
 """Share of that picture that the body takes."""
@@ -32,11 +32,11 @@ ON_PAPER: Final = 0.4
 """Share of crops that have a background of their own."""
 
 YAWS: Final = ((0.0, 22.0, 0.64), (90.0, 22.0, 0.13), (-90.0, 22.0, 0.13), (180.0, 30.0, 0.1))
-"""Mean and spread of the camera's yaw, degrees, on top of the body's own turn; and how often."""
+"""Mean and standard deviation of the camera's yaw, degrees, added to the body's own turn; and probability."""
 
 
 def body_crops(pack: Pack, split: str, number: int, count: int = 4) -> list[Crop]:
-    """Drawings of subject `number` of a split, each from another side and in another style."""
+    """Draw subject `number` of a split `count` times, each from another side and in another style."""
     subject = draw_subject(pack, split, number)
     rng = np.random.default_rng([7, number])
     crops = []
@@ -57,7 +57,7 @@ def _turned(subject: Subject, yaw_deg: float) -> Subject:
 
 
 def _draw(subject: Subject, rng: np.random.Generator) -> Crop | None:
-    raster, labels, corner, pitch = _seen(subject)
+    raster, labels, corner, pitch = _front(subject)
     layers, _ = view_layers(subject, 0, raster, labels)
     materials = [*subject.rig.materials, "cloth.skirt"]
     topmost = [index for index, name in enumerate(materials) if name in ("hair", "hat")]
@@ -72,7 +72,7 @@ def _draw(subject: Subject, rng: np.random.Generator) -> Crop | None:
         colours = np.concatenate([subject.colours, more]) * 255
     style = random_style(materials, rng, colours)
     face = view_face(subject.joints, corner, pitch, DRAWN) if rng.random() < 0.85 else None
-    visible = seen_joints(layers.labels, pixels[:, :2])
+    visible = visible_joints(layers.labels, pixels[:, :2])
     visible[JOINT["eyes"]] &= face is not None
     if rng.random() < ON_PAPER:
         paper = draw_background(style.background, (DRAWN, DRAWN), rng)
@@ -84,7 +84,7 @@ def _draw(subject: Subject, rng: np.random.Generator) -> Crop | None:
 
 
 def _cut_out(layers: Layers, materials: list[str], rng: np.random.Generator, style, face) -> NDArray[np.uint8]:  # type: ignore[no-untyped-def]
-    """(H, W, 4) uint8: what is drawn, and how much of the paper it hides, told from drawings on white and on black."""
+    """(H, W, 4) uint8 colours and alpha of a drawing, computed from drawings on black and on white."""
     style = replace(style, background="white")
     drawn = []
     for ground in (0.0, 255.0):
@@ -97,8 +97,8 @@ def _cut_out(layers: Layers, materials: list[str], rng: np.random.Generator, sty
     return np.concatenate([colour, alpha * 255], axis=-1).astype(np.uint8)
 
 
-def _seen(subject: Subject):  # type: ignore[no-untyped-def]
-    """As `drawing.scene.scene` from the front, with room round the body."""
+def _front(subject: Subject):  # type: ignore[no-untyped-def]
+    """Rasterise the front as `drawing.scene.scene`, with room around the body."""
     vertices = np.concatenate([subject.vertices, subject.skirt_vertices])
     faces = np.concatenate([subject.rig.faces, subject.skirt_faces + len(subject.vertices)])
     label = np.concatenate([subject.rig.face_part, np.full(len(subject.skirt_faces), PART["garment"], np.uint8)])

@@ -1,4 +1,4 @@
-"""Unseen sides of training bodies painted from their fronts: what the refining networks start from."""
+"""Unseen sides of training bodies painted from their fronts: input of the refining networks."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fig2mesh.training.samples.texture_data import Drawings, load_drawings
 from fig2mesh.training.samples.unfold import places, unfold
 
 
-class Sides(NamedTuple):
+class PaintedSides(NamedTuple):
     """N sides: painted, truth (N, 3, H, W) 0-1; uv (N, 2, H, W); depth, labels (N, H, W); known (N, H, W) bool."""
 
     painted: Tensor
@@ -28,7 +28,7 @@ class Sides(NamedTuple):
 
 
 class Painter:
-    """The bodies of `Drawings`, with what a trained network changes of where their colours come from."""
+    """Bodies of `Drawings`, with the offsets that a trained network adds to the positions of their colours."""
 
     def __init__(self, drawings: Drawings, net: TextureFill) -> None:
         self.drawings = drawings
@@ -50,14 +50,14 @@ class Painter:
     def __len__(self) -> int:
         return len(self.drawings)
 
-    def sides(self, rows: NDArray[np.integer], views: NDArray[np.integer]) -> Sides:
-        """Some bodies from some sides."""
+    def sides(self, rows: NDArray[np.integer], views: NDArray[np.integer]) -> PaintedSides:
+        """Paint bodies `rows` from sides `views`."""
         drawings = self.drawings
         uv = torch.from_numpy(drawings.uv[rows, views].astype(np.float32)).movedim(3, 1)
         change = sample(torch.from_numpy(self.changes[rows].astype(np.float32)), 2 * uv - 1)
         place = torch.from_numpy(self.places[rows, views].astype(np.float32)).movedim(3, 1) + change
         front = torch.from_numpy(self.front[rows].astype(np.float32) / 255).movedim(3, 1)
-        return Sides(
+        return PaintedSides(
             sample(front, place),
             torch.from_numpy(drawings.picture[rows, views].astype(np.float32) / 255).movedim(3, 1),
             uv,
@@ -67,6 +67,6 @@ class Painter:
         )
 
 
-def painters(data: Path, net: TextureFill, splits: tuple[str, ...], most: int | None = None) -> Painter:
-    """The bodies of some splits."""
-    return Painter(load_drawings(data, splits, pictures=True, most=most), net)
+def painters(data: Path, net: TextureFill, splits: tuple[str, ...], limit: int | None = None) -> Painter:
+    """Load the bodies of some splits."""
+    return Painter(load_drawings(data, splits, pictures=True, limit=limit), net)

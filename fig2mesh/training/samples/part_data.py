@@ -1,4 +1,4 @@
-"""One kind of body part out of the training shards, in memory: left parts, and right ones in the mirror."""
+"""One kind of body part from the training shards, in memory: left parts, and right ones mirrored."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def turned_grid(grid: NDArray[np.floating], view: int) -> NDArray[np.floating]:
 
 
 def swapped(anchors: NDArray[np.float32], kind: str) -> NDArray[np.float32]:
-    """(..., A, 3) anchors of a part on the middle line in the mirror: left ones are right ones there."""
+    """(..., A, 3) mirrored anchors of a part on the middle line; left and right exchange places."""
     order = [1, 0, 3, 2] if kind == "torso" else list(range(len(ANCHORS[kind])))
     return np.asarray(anchors[..., order, :] * MIRROR, np.float32)
 
@@ -77,10 +77,10 @@ def mirrored_masks(masks: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def load_parts(
     data: Path, kind: str, split: str, *, max_bodies: int | None = None, grid: bool = False, points: bool = True
 ) -> PartData:
-    """All parts of a kind in the shards `data/split*-NNNNN.npz`.
+    """Read all parts of a kind in the shards `data/split*-NNNNN.npz`.
 
     split : "train", "valid-clips", "valid-characters", or "valid" for both
-    grid, points : whether the dense fields and the point samples are read
+    grid, points : read the dense fields and the point samples
     """
     splits = HELD_OUT if split == "valid" else (split,)
     labels = [label for label, name in PART_KIND.items() if name == kind]

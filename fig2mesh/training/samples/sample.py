@@ -15,7 +15,7 @@ from fig2mesh.training.drawing.scene import SCENE, VIEWS, scene
 from fig2mesh.training.samples.sdf import signed_distance
 
 POINTS = 2000
-"""Inside and as many outside points a part (paper §4.2)."""
+"""Number of inside points, and of outside points, per part (paper §4.2)."""
 
 MASK = 64
 GRID = 64
@@ -24,11 +24,11 @@ MARGIN = 1.1
 """Edge of a part's cube relative to the smallest that holds it."""
 
 NEAR = (0.02, 0.06)
-"""Spread of the points that are taken around the surface, PART units: the fine and the coarse half of them."""
+"""Standard deviations of points sampled around the surface, PART units: of one half and of the other."""
 
 
 def geometry(subject: Subject, rng: np.random.Generator, *, grids: bool = False) -> dict[str, NDArray[Any]]:
-    """The arrays of a shard (docs/training.md) for one subject, without the pictures."""
+    """Return the arrays of a shard (docs/training.md) for one subject, without the pictures."""
     centre, edge, size = np.zeros((14, 3)), np.ones(14), np.zeros((14, 3))
     points, distance = np.zeros((14, 2 * POINTS, 3), np.float16), np.zeros((14, 2 * POINTS), np.float16)
     amodal = np.zeros((4, 14, MASK, MASK), bool)
@@ -61,7 +61,7 @@ def geometry(subject: Subject, rng: np.random.Generator, *, grids: bool = False)
 def _sample(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], rng: np.random.Generator
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
-    """As many points inside as outside: over the cube, over the part's box, and near the surface."""
+    """Sample as many points inside as outside: over the cube, over the part's box, and near the surface."""
     corner = vertices[faces]
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     chosen = corner[rng.choice(len(faces), 4000, p=area / area.sum())]
@@ -70,7 +70,7 @@ def _sample(
     near += rng.normal(size=near.shape) * np.repeat(NEAR, len(near) // 2)[:, None]
     box = rng.uniform(vertices.min(axis=0), vertices.max(axis=0), (3000, 3))
     everywhere = rng.uniform(-1.0, 1.0, (1500, 3))
-    # What is stored in half precision is what the distance is measured at.
+    # Distances are measured at the points as they are stored, in half precision.
     query = np.clip(np.concatenate([near, box, everywhere]), -1.0, 1.0).astype(np.float16)
     found = signed_distance(vertices, faces, query.astype(np.float32))
     inside, outside = np.flatnonzero(found < 0), np.flatnonzero(found >= 0)
@@ -93,21 +93,21 @@ def _dense(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[n
 def _amodal(
     vertices: NDArray[np.float64], own: NDArray[np.int32], part: PartTopology, faces: NDArray[np.int32]
 ) -> NDArray[np.bool_]:
-    """(4, 64, 64) the whole part from the four sides; front and back, left and right are mirror images.
+    """(4, 64, 64) masks of the whole part from the four sides; front and back, left and right are mirror images.
 
-    Only the part's own faces count, not the rings by which it reaches into its neighbours: a drawing's regions meet.
+    Only the part's own faces count, not the rings that overlap its neighbours: a drawing's regions meet.
     """
     _, inverse = np.unique(part.faces, return_inverse=True)
     lookup = np.full(int(part.faces.max()) + 1, -1)
     lookup[part.faces.ravel()] = inverse.ravel()
     seen = [coverage(vertices @ VIEWS[k].T, lookup[own], size=MASK, low=(-1.0, -1.0), pitch=2.0 / MASK) for k in (0, 1)]
-    # Own faces are an open tube, and along its axis one looks through; drawn regions have no such holes.
+    # The faces are an open tube with a hole along its axis; drawn regions have no such holes.
     seen = [filled(mask) for mask in seen]
     return np.stack([seen[0], seen[1], seen[0][:, ::-1], seen[1][:, ::-1]])
 
 
 def filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(H, W) bool: a mask without holes; what cannot be reached from the border by sides of pixels is inside."""
+    """(H, W) bool: a mask with its holes filled; the background is connected by sides of pixels."""
     outside = np.zeros(tuple(length + 2 for length in mask.shape), bool)
     outside[0] = outside[-1] = outside[:, 0] = outside[:, -1] = True
     free = np.pad(~mask, 1, constant_values=True)
@@ -124,7 +124,7 @@ def filled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _visible(subject: Subject, centre: NDArray[np.float64], edge: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(4, 14, 64, 64) where the drawing shows each part, in the part's own square."""
+    """(4, 14, 64, 64) bool: visible region of each part, in the part's own square."""
     step = (np.arange(MASK) + 0.5) / MASK * 2.0 - 1.0
     result = np.zeros((4, 14, MASK, MASK), bool)
     for view, turn in enumerate(VIEWS):

@@ -1,4 +1,4 @@
-"""Exact signed distances to closed meshes: Open3D where it is installed, else the same with nothing but torch."""
+"""Exact signed distances to closed meshes: by Open3D where it is installed, otherwise by torch alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import torch
 
 CHUNK, CHUNK_CPU = 4_000_000, 60_000
-"""Pairs of point and triangle that the torch way holds at once; on a CPU as many as its cache has room for."""
+"""Pairs of point and triangle per batch of the torch method; on a CPU as many as fit its cache."""
 
 
 def signed_distance(
@@ -32,7 +32,7 @@ def signed_distance(
 def signed_distance_torch(
     vertices: NDArray[np.floating], faces: NDArray[np.integer], points: NDArray[np.floating], device: str = "cpu"
 ) -> NDArray[np.float32]:
-    """As `signed_distance`; brute force over all triangles, the sign from the winding number (Jacobson et al. 2013)."""
+    """As `signed_distance`, brute force over all triangles, the sign from the winding number (Jacobson et al. 2013)."""
     import torch
 
     corner = np.asarray(vertices, np.float32)[faces].transpose(1, 2, 0)  # (3 corners, 3 axes, F)
@@ -48,7 +48,7 @@ def signed_distance_torch(
 
 
 def _dot(u: torch.Tensor, v: torch.Tensor) -> torch.Tensor:
-    """Of vectors whose axes come first: so laid out, each axis is one array, and products are those of arrays."""
+    """Dot product of vectors whose axes come first, so that each axis is one contiguous array."""
     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 
 

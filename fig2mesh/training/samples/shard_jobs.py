@@ -1,4 +1,4 @@
-"""Shards of training data, made one after the other or by several processes."""
+"""Shards of training data, made in sequence or by several processes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 def make_shards(
     make: Callable[..., object], tasks: Sequence[tuple[Any, ...]], jobs: int, report: Callable[[int, int], None]
 ) -> None:
-    """Call `make` with each task's arguments, in `jobs` processes; `report` is told how many of them are done."""
+    """Call `make` with each task's arguments, in `jobs` processes; `report` gets the numbers of done and all tasks."""
     done = 0
     report(done, len(tasks))
     if jobs == 1:

@@ -20,10 +20,10 @@ NAMES: Final = ("picture", "labels", "depth", "uv")
 class Drawings:
     """B bodies from four sides: front, left, back, right.
 
-    picture : (B, 4, H, W, 3) uint8 sRGB, empty where not asked for
+    picture : (B, 4, H, W, 3) uint8 sRGB, empty where not requested
     labels : (B, 4, H, W) uint8, `PART_NAMES`
-    depth : (B, 4, H, W) float16, VIEW z, FIGURE units, -inf where nothing is seen
-    uv : (B, 4, H, W, 2) float16, body texture coordinates; zeros where nothing is seen and on skirts
+    depth : (B, 4, H, W) float16, VIEW z, FIGURE units, -inf where nothing is visible
+    uv : (B, 4, H, W, 2) float16, body texture coordinates; zeros where nothing is visible and on skirts
     """
 
     picture: NDArray[np.uint8]
@@ -40,20 +40,20 @@ class Drawings:
         return np.asarray((labels > 0) & (labels != PART["garment"]))
 
 
-def load_drawings(data: Path, splits: Sequence[str], *, pictures: bool, most: int | None = None) -> Drawings:
-    """The bodies of all shards of some splits that have texture coordinates; characters have none.
+def load_drawings(data: Path, splits: Sequence[str], *, pictures: bool, limit: int | None = None) -> Drawings:
+    """Load the bodies of all shards of some splits that have texture coordinates; characters have none.
 
-    most : bodies at most of each split
+    limit : maximum number of bodies of each split
     """
     columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in NAMES}
     for split in splits:
         count = 0
         for path in shards(data, split):
-            if most is not None and count >= most:
+            if limit is not None and count >= limit:
                 break
             arrays = read_shard(path, NAMES)
             rows = np.flatnonzero(arrays["uv"].any(axis=(1, 2, 3, 4)))
-            rows = rows if most is None else rows[: most - count]
+            rows = rows if limit is None else rows[: limit - count]
             count += len(rows)
             for name in NAMES:
                 kept = arrays[name][rows]

@@ -1,4 +1,4 @@
-"""Bodies of the training data as if they had been traced: what the evaluation of textures works on."""
+"""Bodies of the training data as if they had been traced, for the evaluation of textures."""
 
 from __future__ import annotations
 
@@ -11,43 +11,44 @@ from numpy.typing import NDArray
 
 from fig2mesh.records import Pose3D
 from fig2mesh.skeleton import JOINT, PART
-from fig2mesh.texture.sides import Sides, body_labels
+from fig2mesh.texture.sides import SideViews, body_labels
 from fig2mesh.texture.space import inwards
 from fig2mesh.training.samples.build import read_shard, shards
 from fig2mesh.training.samples.texture_data import Drawings, load_drawings
-from fig2mesh.training.samples.unfold import carried_on, front_scale, places
+from fig2mesh.training.samples.unfold import extend_colours, front_scale, places
 
 FACE_WIDTH, FACE_UP, FACE_DOWN = 0.9, 0.35, 1.2
-"""Half axes of the drawn features about the eyes, relative to the distance of the eyes from the head's middle."""
+"""Half axes of the region of drawn features about the eyes, relative to their distance from the head's middle."""
 
 FACING: Final = 0.15
-"""A face looks at the viewer if its eyes are this much nearer than the head's middle, relative to that distance."""
+"""Threshold above which a face is towards the viewer: how much nearer its eyes are than the head's middle, relative to
+their distance."""
 
 FILLED: Final = 0.9
-"""Share of half the picture's edge that the figure reaches upwards."""
+"""Height of the figure above the picture's middle, as a share of half the edge."""
 
 
 @dataclass(frozen=True)
-class Subject:
+class TexturedSubject:
     """One body of `Drawings` as if it were traced, and its front picture.
 
-    sides : see `Sides`; FIGURE x, y relative to the middle of the front
-    front : (H, W, 3) float32, 0-255, colours carried on beyond the silhouette
+    sides : see `SideViews`; FIGURE x, y relative to the middle of the front
+    front : (H, W, 3) float32, 0-255, colours extended beyond the silhouette
     truth : (4, H, W, 3) float32, 0-255
-    face : (H, W) bool, where the front has eyes and mouth
+    face : (H, W) bool, region of the front with eyes and mouth
     joints_px : (21, 2) float32, pixels of the front
     """
 
-    sides: Sides
+    sides: SideViews
     front: NDArray[np.float32]
     truth: NDArray[np.float32]
     face: NDArray[np.bool_]
     joints_px: NDArray[np.float32]
 
 
-def subjects(data: Path, split: str, most: int) -> list[Subject]:
-    """The first bodies of a split that have texture coordinates."""
-    drawings = load_drawings(data, (split,), pictures=True, most=most)
+def subjects(data: Path, split: str, limit: int) -> list[TexturedSubject]:
+    """Load the first `limit` bodies of a split that have texture coordinates."""
+    drawings = load_drawings(data, (split,), pictures=True, limit=limit)
     joints: list[NDArray[np.float32]] = []
     for path in shards(data, split):
         arrays = read_shard(path, ("joints", "uv"))
@@ -55,7 +56,7 @@ def subjects(data: Path, split: str, most: int) -> list[Subject]:
     return [_subject(drawings, row, joints[row].astype(np.float32)) for row in range(len(drawings))]
 
 
-def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subject:
+def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> TexturedSubject:
     labels, depth = drawings.labels[row], drawings.depth[row].astype(np.float32)
     place = places(labels, depth)
     size = labels.shape[1]
@@ -86,15 +87,15 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Subje
     face = _face(own, joints, joints_px, pitch)
     top = float(joints[:, 1].max())
     pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * FILLED], joints[:, 2:]], axis=1))
-    sides = Sides(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
-    front = carried_on(picture[0], inwards(labels[0] > 0))
-    return Subject(sides, front, picture, face, joints_px.astype(np.float32))
+    sides = SideViews(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
+    front = extend_colours(picture[0], inwards(labels[0] > 0))
+    return TexturedSubject(sides, front, picture, face, joints_px.astype(np.float32))
 
 
 def _face(
     own: NDArray[np.bool_], joints: NDArray[np.float32], joints_px: NDArray[np.floating], pitch: float
 ) -> NDArray[np.bool_]:
-    """(H, W) bool: where on the head (H, W) the draughtsman drew eyes and mouth."""
+    """(H, W) bool: region of the head (H, W) in which eyes and mouth are drawn."""
     head, eyes = (joints[JOINT[name]] for name in ("head", "eyes"))
     reach = float(np.linalg.norm(eyes - head))
     if not own.any() or eyes[2] - head[2] <= FACING * reach:

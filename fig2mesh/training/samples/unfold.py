@@ -1,4 +1,4 @@
-"""Bodies of `Drawings` in texture space: where each texel is behind the front picture, and what its colour is."""
+"""Bodies of `Drawings` in texture space: position of each texel behind the front picture, and its colour."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ class Unfolded:
     """B bodies in texture space.
 
     place : (B, S, S, 2) float16, x, y in the front picture, edges at -1 and 1, y down
-    there, seen, same : (B, S, S) bool, see `fill_inputs`
-    truth : (B, S, S, 3) uint8, mean colour of the sides that see the texel; weight : (B, S, S) float16, 0 to 1
+    there, observed, same : (B, S, S) bool, see `fill_inputs`
+    truth : (B, S, S, 3) uint8, mean colour over the sides that show the texel; weight : (B, S, S) float16, 0 to 1
     part : (B, S, S) uint8, label of the texel
-    front : (B, H, W, 3) uint8, the front picture, its colours carried on beyond the silhouette
+    front : (B, H, W, 3) uint8, the front picture, its colours extended beyond the silhouette
     inside : (B, H, W) bool, the silhouette
     """
 
     place: NDArray[np.float16]
     there: NDArray[np.bool_]
-    seen: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     same: NDArray[np.bool_]
     truth: NDArray[np.uint8]
     weight: NDArray[np.float16]
@@ -43,9 +43,9 @@ class Unfolded:
 
 
 def front_scale(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> tuple[float, float]:
-    """Units of depth that a pixel of the front picture is wide, and the x in its middle.
+    """Width of a pixel of the front picture in units of depth, and the x of its middle.
 
-    Depths from left and right tell how wide the front is. labels, depth : (4, H, W)
+    The width of the front follows from the depths of left and right. labels, depth : (4, H, W)
     """
     columns = np.flatnonzero((labels[0] > 0).any(axis=0))
     left, right = (
@@ -55,9 +55,9 @@ def front_scale(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> tuple
 
 
 def places(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(4, H, W, 2) x, y in the front picture of what each pixel of the four sides (4, H, W) shows, edges at -1 and 1.
+    """(4, H, W, 2) x, y in the front picture of the surface at each pixel of the four sides, edges at -1 and 1.
 
-    Every side is framed about the middle of its own box, so the box's height tells the sides' scales apart.
+    Every side is framed about the middle of its own box, so the sides' scales follow from the heights of the boxes.
     """
     size = labels.shape[1]
     heights = []
@@ -77,10 +77,10 @@ def places(labels: NDArray[np.uint8], depth: NDArray[np.floating]) -> NDArray[np
     return result
 
 
-def carried_on(picture: NDArray[P], inner: NDArray[np.float64]) -> NDArray[P]:
-    """(H, W, 3) a picture whose colours go on beyond the silhouette; its rim is mixed with the ground.
+def extend_colours(picture: NDArray[P], inner: NDArray[np.float64]) -> NDArray[P]:
+    """(H, W, 3) picture with colours extended beyond the silhouette, whose rim is mixed with the background.
 
-    inner : (H, W) how far inside each pixel is, see `inwards`
+    inner : (H, W) distance of each pixel inside the silhouette, see `inwards`
     """
     nearest = ndimage.distance_transform_edt(inner < 2, return_distances=False, return_indices=True)
     result: NDArray[P] = picture[tuple(nearest)]
@@ -88,7 +88,7 @@ def carried_on(picture: NDArray[P], inner: NDArray[np.float64]) -> NDArray[P]:
 
 
 def unfold(drawings: Drawings) -> Unfolded:
-    """All bodies of `drawings`."""
+    """Unfold all bodies of `drawings`."""
     columns: list[tuple[NDArray[np.generic], ...]] = [_unfold(drawings, row) for row in range(len(drawings))]
     return Unfolded(*(np.stack(column) for column in zip(*columns, strict=True)))
 
@@ -117,6 +117,6 @@ def _unfold(drawings: Drawings, row: int) -> tuple[NDArray[np.generic], ...]:
         np.clip(np.round(means[..., 2:5]), 0, 255).astype(np.uint8),
         np.clip(total, 0, 1).astype(np.float16),
         part,
-        carried_on(drawings.picture[row, 0], inner[0]),
+        extend_colours(drawings.picture[row, 0], inner[0]),
         labels[0] > 0,
     )

@@ -56,7 +56,7 @@ def test_values_are_plain_and_stay_so(pairs: list[tuple[str, object]]) -> None:
         (float("inf"), None),
     ],
 )
-def test_scalars_of_others(given_value: object, wanted: object) -> None:
+def test_scalars_of_other_types(given_value: object, wanted: object) -> None:
     ((_, found),) = plain_attributes({"x": given_value})
     assert found == wanted
     assert type(found) is type(wanted)

@@ -1,4 +1,4 @@
-"""CZML and GeoJSON: what they say of the place, and that it is checked; for CesiumJS see test_clients_tiles.py."""
+"""CZML and GeoJSON: their places, and the checks of them; for CesiumJS see test_clients_tiles.py."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_clamped_figures_stand_on_the_terrain(height: float, mode: Any, referenc
     assert found["position"]["cartographicDegrees"] == [8.5, 47.4, height]
 
 
-def test_text_of_others_is_escaped() -> None:
+def test_foreign_text_is_escaped() -> None:
     evil = PlacedFigure(
         "<b>", ZURICH, (0, 0, 0), (1, 1, 1), ("x.glb",), (0.0,), "<script>alert('a')</script>", 'A & B "C"', ("<i>",)
     )
@@ -94,7 +94,7 @@ def test_text_of_others_is_escaped() -> None:
 
 @pytest.mark.parametrize("suffix", [".czml", ".geojson"])
 @pytest.mark.parametrize("place", [ZURICH, CLAMPED, GeoPlacement(0, 90), GeoPlacement(-180, -90), GeoPlacement(180, 0)])
-def test_the_model_lies_beside_and_all_is_clean(tmp_path: Path, suffix: str, place: GeoPlacement) -> None:
+def test_the_model_is_next_to_the_file_and_all_is_valid(tmp_path: Path, suffix: str, place: GeoPlacement) -> None:
     written = write(asset(place, name="a name"), tmp_path / f"my farmer{suffix}")
     assert [path.name for path in written] == ["my farmer.glb", f"my farmer{suffix}"]
     assert validate(written[-1], external=False) == []
@@ -162,7 +162,7 @@ def test_faults_of_czml(tmp_path: Path, fault: str) -> None:
     assert code in _edit(tmp_path / "a.czml", change)
 
 
-def test_files_of_others(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_foreign_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     places = {
         "type": "FeatureCollection",
         "crs": {},

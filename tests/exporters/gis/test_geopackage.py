@@ -54,25 +54,25 @@ def _geojson(figures: list[PlacedFigure], path: Path) -> list[dict[str, Any]]:
     return features
 
 
-def _same(stored: Any, said: Any) -> bool:
+def _same(stored: Any, expected: Any) -> bool:
     """Whether a column holds a value; one that must hold text as well has numbers as JSON writes them."""
-    if isinstance(stored, str) and not isinstance(said, str) and said is not None:
-        return stored == json.dumps(said)
-    return bool(stored == said)
+    if isinstance(stored, str) and not isinstance(expected, str) and expected is not None:
+        return stored == json.dumps(expected)
+    return bool(stored == expected)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(figures=tables())
-def test_all_is_as_in_geojson(tmp_path: Path, figures: list[PlacedFigure]) -> None:
+def test_the_layer_equals_geojson(tmp_path: Path, figures: list[PlacedFigure]) -> None:
     path = tmp_path / "index.gpkg"
     assert write_geopackage(figures, path) == len(figures)
     features = _geojson(figures, tmp_path / "index.geojson")
     rows = _rows(path)
     assert len(rows) == len(features)
-    for row, said in zip(rows, features, strict=True):
-        assert list(row) == list(said["properties"])
-        assert all(_same(row[name], value) for name, value in said["properties"].items())
-    assert _coordinates(path) == [said["geometry"]["coordinates"] for said in features]
+    for row, expected in zip(rows, features, strict=True):
+        assert list(row) == list(expected["properties"])
+        assert all(_same(row[name], value) for name, value in expected["properties"].items())
+    assert _coordinates(path) == [expected["geometry"]["coordinates"] for expected in features]
 
 
 def _is_stored(stored: Any, value: Any) -> bool:
@@ -104,19 +104,19 @@ def test_whole_numbers_keep_all_digits(tmp_path: Path, column: list[int | float 
     figures = [figure("a", ZURICH, {"x": value}) for value in column]
     write_geopackage(figures, tmp_path / "a.gpkg")
     stored = [row["x"] for row in _rows(tmp_path / "a.gpkg")]
-    said = [each["properties"]["x"] for each in _geojson(figures, tmp_path / "a.geojson")]
-    for value, *found in zip(column, stored, said, strict=True):
+    expected = [each["properties"]["x"] for each in _geojson(figures, tmp_path / "a.geojson")]
+    for value, *found in zip(column, stored, expected, strict=True):
         assert all(each is None if value is None else _is_stored(each, value) for each in found)
     whole = [value for value in column if value is not None]
     if whole and all(type(value) is int and -(2**63) <= value < 2**63 for value in whole):
         assert all(type(each) is int for each in stored if each is not None)
-        assert said == column
+        assert expected == column
     # One number that GDAL does not know makes the whole file unreadable.
     assert pyogrio.read_info(tmp_path / "a.geojson")["features"] == len(column)
 
 
 @pytest.mark.parametrize("places", [[ZURICH], [CLAMPED], [ZURICH, CLAMPED], [CLAMPED, ZURICH]])
-def test_gdal_sees_the_same_layer_in_both(tmp_path: Path, places: list[GeoPlacement]) -> None:
+def test_gdal_reads_the_same_layer_from_both(tmp_path: Path, places: list[GeoPlacement]) -> None:
     figures = [figure("a", place, {"year": 1893, "share": 0.5, "artist": "=A", "sure": True}) for place in places]
     write_geopackage(figures, tmp_path / "index.gpkg")
     _geojson(figures, tmp_path / "index.geojson")
@@ -137,7 +137,7 @@ def test_gdal_sees_the_same_layer_in_both(tmp_path: Path, places: list[GeoPlacem
         assert database.execute("SELECT z, m FROM gpkg_geometry_columns").fetchall() == [(flag, 0)]
 
 
-def test_the_stored_reference_system_puts_figures_where_we_do(tmp_path: Path) -> None:
+def test_the_stored_reference_system_places_figures_correctly(tmp_path: Path) -> None:
     figures = [each for each in many(300) if each.placement.altitude_mode == "absolute"]
     write_geopackage(figures, tmp_path / "a.gpkg")
     crs = pyproj.CRS.from_user_input(pyogrio.read_info(tmp_path / "a.gpkg")["crs"])
@@ -165,7 +165,7 @@ def test_the_bytes_do_not_depend_on_the_time(tmp_path: Path) -> None:
     assert stamps == {"1970-01-01T00:00:00.000Z"}
 
 
-def test_settings_of_others_are_given_back(tmp_path: Path) -> None:
+def test_gdal_settings_are_restored(tmp_path: Path) -> None:
     pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2001-01-01T00:00:00.000Z"})
     try:
         write_geopackage([], tmp_path / "a.gpkg")
@@ -248,10 +248,10 @@ def test_without_figures_the_columns_are_there(tmp_path: Path) -> None:
 
 
 def test_failures_are_a_table_without_geometry(tmp_path: Path) -> None:
-    failed: list[Failure] = [(2, "anna", "no.png: is not there; check the name"), (9, "", "=x")]
+    failed: list[Failure] = [(2, "anna", "no.png: no such file or folder; check the path"), (9, "", "=x")]
     write_geopackage(many(3), tmp_path / "a.gpkg", failed=failed)
     assert _rows(tmp_path / "a.gpkg", "failed") == [
-        {"row": 2, "name": "anna", "error": "no.png: is not there; check the name"},
+        {"row": 2, "name": "anna", "error": "no.png: no such file or folder; check the path"},
         {"row": 9, "name": "", "error": "=x"},
     ]
     assert pyogrio.read_info(tmp_path / "a.gpkg", layer="failed")["geometry_type"] is None
@@ -273,7 +273,7 @@ def test_names_that_gdal_might_misread(tmp_path: Path, name: str) -> None:
     assert [each for each in tmp_path.rglob("*") if each.is_file()] == [path]
 
 
-def test_what_goes_wrong_leaves_nothing(tmp_path: Path) -> None:
+def test_failures_leave_nothing(tmp_path: Path) -> None:
     def broken() -> Iterator[PlacedFigure]:
         yield from many(3)
         raise ExportError("x.glb", "is broken", "make it again")

@@ -57,8 +57,8 @@ def test_dates(text: str, start: str, end: str) -> None:
         "9999-12-31T23:00:00-02:00",
     ],
 )
-def test_what_is_no_date(text: str) -> None:
-    with pytest.raises(ExportError, match=r"date of anna: .* (is no date|ends before it starts)"):
+def test_invalid_dates(text: str) -> None:
+    with pytest.raises(ExportError, match=r"date of anna: .* (is not an ISO 8601 date|ends before it starts)"):
         time_span(text, "date of anna")
 
 

@@ -55,7 +55,7 @@ def test_trimesh_reads_the_same_mesh(tmp_path: Path, suffix: str) -> None:
 
 
 def test_front_of_the_picture_is_in_front(tmp_path: Path) -> None:
-    # The middle of the texture, u = v = 1/2, must be where the figure looks at the reader: on +z.
+    # The middle of the texture, u = v = 1/2, must be where the figure faces the reader: on +z.
     path = tmp_path / "farmer.glb"
     write_glb(asset(), path)
     read = trimesh.load_mesh(path, process=False)
@@ -85,7 +85,7 @@ def test_own_checks_are_clean(tmp_path: Path, name: str) -> None:
     assert validate(tmp_path / "b.gltf", external=False) == []
 
 
-def test_document_says_what_the_asset_says(tmp_path: Path) -> None:
+def test_document_has_the_facts_of_the_asset(tmp_path: Path) -> None:
     write_glb(asset(ZURICH), tmp_path / "a.glb")
     gltf = pygltflib.GLTF2().load(str(tmp_path / "a.glb"))
     assert (gltf.asset.generator, gltf.asset.copyright) == ("fig2mesh", "© Zürich map, CC BY 4.0")
@@ -135,7 +135,7 @@ def test_a_mesh_with_a_hole_does_not_claim_to_be_manifold() -> None:
     assert b"EXT_mesh_manifold" in glb_bytes(asset())
 
 
-def test_texels_say_what_the_drawing_showed(tmp_path: Path) -> None:
+def test_a_property_texture_marks_observed_texels(tmp_path: Path) -> None:
     path = tmp_path / "farmer.glb"
     write_glb(asset(ZURICH), path)
     gltf = read_gltf(path)
@@ -147,21 +147,21 @@ def test_texels_say_what_the_drawing_showed(tmp_path: Path) -> None:
         assert np.array_equal(np.asarray(image), half_observed().pixels[..., 0])
     primitive = gltf.document["meshes"][0]["primitives"][0]
     assert primitive["extensions"]["EXT_structural_metadata"] == {"propertyTextures": [0]}
-    # The colours stay the first image: clients that know no metadata look no further.
+    # The colours stay the first image: clients without metadata support use only that.
     assert primitive["material"] == 0
     assert gltf.document["textures"][0]["source"] == 0
 
 
-def test_parts_and_how_much_of_them_was_seen(tmp_path: Path) -> None:
+def test_parts_and_their_observed_shares(tmp_path: Path) -> None:
     write_glb(asset(), tmp_path / "a.glb")
     gltf = read_gltf(tmp_path / "a.glb")
     (table,) = gltf.document["extensions"]["EXT_structural_metadata"]["propertyTables"]
     shares = np.frombuffer(gltf.view(table["properties"]["observedShare"]["values"]), "<f4")
-    # The mask shows half of each part; 16 samples a triangle resolve its two edges to 1/100 of the circumference.
+    # The mask shows half of each part; 16 samples per triangle resolve its two edges to 1/100 of the circumference.
     assert shares == pytest.approx([0.5] * 3, abs=0.01)
     primitive = gltf.document["meshes"][0]["primitives"][0]
     ids = gltf.accessor(primitive["attributes"]["_FEATURE_ID_0"])[gltf.accessor(primitive["indices"])]
-    # One id to a triangle, as clients interpolate between its corners.
+    # One id per triangle, as clients interpolate between its corners.
     assert np.array_equal(np.array([1, 2, 9])[ids.astype(int)], np.repeat(face_parts(asset().mesh), 3))
 
 

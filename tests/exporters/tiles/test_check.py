@@ -1,4 +1,4 @@
-"""Checks of tilesets that are not ours: what is legal passes, what is not looked into is said."""
+"""Checks of foreign tilesets: legal ones pass, and unchecked parts are reported."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def many(tmp_path: Path) -> Path:
     return tmp_path / "out"
 
 
-def test_a_vertex_is_looked_for_in_volumes_of_other_files(many: Path) -> None:
+def test_vertices_are_checked_against_volumes_of_other_files(many: Path) -> None:
     _change(
         many, lambda d: d["root"]["boundingVolume"]["box"].__setitem__(0, d["root"]["boundingVolume"]["box"][0] + 50)
     )
@@ -109,14 +109,14 @@ def test_scaled_transforms_of_others_are_a_warning(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("magic", [b"pnts", b"i3dm", b"cmpt", b"vctr", b"geom"])
-def test_other_kinds_of_content_are_said_to_be_unchecked(tmp_path: Path, magic: bytes) -> None:
+def test_other_types_of_content_are_reported_as_unchecked(tmp_path: Path, magic: bytes) -> None:
     (tmp_path / "b.bin").write_bytes(magic + bytes(28))
     _foreign(tmp_path, contents=[{"uri": "a.glb"}, {"uri": "b.bin?v=3"}, {"uri": "https://example.org/c.glb"}])
     found = validate(tmp_path, external=False)
     assert [(each.severity, each.code) for each in found] == [("info", "NOT_CHECKED")] * 2
 
 
-def test_implicit_tiling_is_said_to_be_unchecked(tmp_path: Path) -> None:
+def test_implicit_tiling_is_reported_as_unchecked(tmp_path: Path) -> None:
     _foreign(tmp_path, content={"uri": "{level}/{x}/{y}.glb"}, implicitTiling={"subdivisionScheme": "QUADTREE"})
     assert [each.code for each in validate(tmp_path, external=False)] == ["NOT_CHECKED"]
 
@@ -174,18 +174,22 @@ def _volume(kind: str, values: list[float]) -> Volume:
     return Volume({kind: values}, np.eye(4), "here")
 
 
-def test_how_far_volumes_reach_out() -> None:
+def test_distances_by_which_volumes_reach_out() -> None:
     box = _volume("box", [0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0, 5])
-    assert box.holds(_volume("sphere", [0, 0, 0, 3])) == pytest.approx(0)
-    assert box.holds(_volume("sphere", [1, 0, 0, 3])) == pytest.approx(1)
-    assert box.holds(_volume("box", [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 7])) == pytest.approx(2)
+    assert box.excess_of(_volume("sphere", [0, 0, 0, 3])) == pytest.approx(0)
+    assert box.excess_of(_volume("sphere", [1, 0, 0, 3])) == pytest.approx(1)
+    assert box.excess_of(_volume("box", [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 7])) == pytest.approx(2)
     sphere = _volume("sphere", [0, 0, 0, 10])
-    assert sphere.holds(_volume("sphere", [3, 4, 0, 6])) == pytest.approx(1)
-    assert sphere.holds(_volume("box", [0, 0, 0, 6, 0, 0, 0, 8, 0, 0, 0, 0.1])) == pytest.approx(5e-4, abs=1e-6)
+    assert sphere.excess_of(_volume("sphere", [3, 4, 0, 6])) == pytest.approx(1)
+    assert sphere.excess_of(_volume("box", [0, 0, 0, 6, 0, 0, 0, 8, 0, 0, 0, 0.1])) == pytest.approx(5e-4, abs=1e-6)
     # A quarter of a degree of the equator, 28 km: its middle is 9 m above the chord.
     region = _volume("region", [0, 0, np.radians(0.25), np.radians(1e-6), 0, 1])
     centre = ecef_from_geodetic([[0.125, 0, 0]])[0].tolist()
-    assert _volume("sphere", [*centre, 14_000]).holds(region) < 0 < _volume("sphere", [*centre, 13_000]).holds(region)
+    assert (
+        _volume("sphere", [*centre, 14_000]).excess_of(region)
+        < 0
+        < _volume("sphere", [*centre, 13_000]).excess_of(region)
+    )
     half_turn = Volume({"box": [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]}, np.diag([2.0, 2.0, 2.0, 1.0]), "scaled")
-    assert box.holds(half_turn) < 0
-    assert _volume("box", [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]).holds(half_turn) == pytest.approx(1)
+    assert box.excess_of(half_turn) < 0
+    assert _volume("box", [0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]).excess_of(half_turn) == pytest.approx(1)

@@ -1,4 +1,4 @@
-"""`write_figures`: many files into one folder, whole or not at all, whatever their names and order."""
+"""`write_figures`: many files into one folder, atomically, with any names and in any order."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _bytes(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("version", ["1.0", "1.1"])
-def test_all_figures_are_there_and_all_is_clean(tmp_path: Path, folder: Path, version: str) -> None:
+def test_all_figures_are_present_and_valid(tmp_path: Path, folder: Path, version: str) -> None:
     written = write_figures([folder], tmp_path / "out", version=version)
     assert written.figures == 6
     assert {path.relative_to(tmp_path / "out").as_posix() for path in written.files} == set(_bytes(tmp_path / "out"))
@@ -69,7 +69,7 @@ def test_all_figures_are_there_and_all_is_clean(tmp_path: Path, folder: Path, ve
     assert {str(file) for file in found} == {name for name in _bytes(tmp_path / "out") if name.startswith("figures/")}
 
 
-def test_every_vertex_is_in_every_box_above_and_where_its_file_says(tmp_path: Path, folder: Path) -> None:
+def test_every_vertex_is_in_all_boxes_above_and_at_its_recorded_place(tmp_path: Path, folder: Path) -> None:
     write_figures([folder], tmp_path / "out")
     for met in contents(tmp_path / "out"):
         gltf = read_gltf(tmp_path / "out" / met.uri)
@@ -123,7 +123,7 @@ def test_a_tileset_of_figures_can_be_gathered_again(tmp_path: Path, folder: Path
     assert _bytes(tmp_path / "again") == _bytes(tmp_path / "out")
 
 
-def test_what_a_file_says_is_what_the_asset_said(tmp_path: Path) -> None:
+def test_records_read_from_files_equal_those_of_the_assets(tmp_path: Path) -> None:
     given = asset(ZURICH)
     write(given, tmp_path / "tiles")
     names = ("farmer.glb", "farmer_lod1.glb", "farmer_lod2.glb")
@@ -146,10 +146,10 @@ def test_contents_are_the_sources_to_the_bit_copied_or_linked(tmp_path: Path, fo
     assert {path.stat().st_nlink for path in (tmp_path / "linked" / "figures").iterdir()} == {2}
 
 
-def test_overwriting_takes_away_what_only_the_old_tileset_named(tmp_path: Path, folder: Path) -> None:
+def test_overwriting_removes_files_of_the_old_tileset(tmp_path: Path, folder: Path) -> None:
     write_figures([folder], tmp_path / "out")
     (tmp_path / "out" / "figures" / "mine.txt").write_text("mine")
-    with pytest.raises(ExportError, match=r"tileset\.json: exists already"):
+    with pytest.raises(ExportError, match=r"tileset\.json: already exists"):
         write_figures([folder / "0.glb"], tmp_path / "out")
     write_figures([folder / "0.glb"], tmp_path / "out", overwrite=True)
     assert set(_bytes(tmp_path / "out")) == {
@@ -161,7 +161,7 @@ def test_overwriting_takes_away_what_only_the_old_tileset_named(tmp_path: Path, 
     }
 
 
-def test_foreign_tilesets_lose_nothing_but_the_names_we_need(tmp_path: Path, folder: Path) -> None:
+def test_only_needed_names_are_replaced_in_foreign_tilesets(tmp_path: Path, folder: Path) -> None:
     (tmp_path / "out" / "figures").mkdir(parents=True)
     foreign = {"asset": {"version": "1.0"}, "root": {"content": {"uri": "figures/theirs.glb"}}}
     (tmp_path / "out" / "tileset.json").write_text(json.dumps(foreign))
@@ -211,10 +211,10 @@ def test_bad_input_is_one_line_and_leaves_nothing(
     (tmp_path / "note.txt").write_text("x")
     cases = {
         tmp_path / "nowhere.glb": "has no place on the earth; make it with --lonlat LON LAT",
-        tmp_path / "empty": "holds no figure",
-        tmp_path / "broken.glb": "no readable glTF",
-        tmp_path / "note.txt": "is no figure",
-        tmp_path / "gone.glb": "is not there",
+        tmp_path / "empty": "contains no figure",
+        tmp_path / "broken.glb": "not a valid glTF file",
+        tmp_path / "note.txt": "not a figure",
+        tmp_path / "gone.glb": "no such file or folder",
     }
     for source, finding in cases.items():
         line = _refused(capsys, folder, source, "-o", out)
@@ -222,7 +222,7 @@ def test_bad_input_is_one_line_and_leaves_nothing(
         assert finding in line
         assert not out.exists()
     assert "--visible-from" in _refused(capsys, folder, "-o", out, "--visible-from", "-1")
-    assert "note.txt is not a folder" in _refused(capsys, folder, "-o", tmp_path / "note.txt" / "out")
+    assert "note.txt is not a directory" in _refused(capsys, folder, "-o", tmp_path / "note.txt" / "out")
     assert not out.exists()
 
 

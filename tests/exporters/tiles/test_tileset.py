@@ -17,8 +17,8 @@ from exporters.gltf.reader import read_gltf
 from exporters.tiles.tileset import (
     VISIBLE_RANGE_PER_ERROR,
     root_tile,
+    short_range_warning,
     tileset,
-    too_near_note,
     visible_range,
     write_tileset,
 )
@@ -79,12 +79,12 @@ def test_a_person_has_a_range_of_two_kilometres() -> None:
     assert tileset(asset(ZURICH))["geometricError"] == 2000.0 / VISIBLE_RANGE_PER_ERROR
 
 
-def test_a_range_of_less_than_ten_heights_is_noted() -> None:
-    assert too_near_note(None, 6186.2) is None
-    assert too_near_note(18_000.0, 1800.0) is None
-    note = too_near_note(2000.0, 1800.0)
+def test_a_range_of_less_than_ten_heights_is_a_warning() -> None:
+    assert short_range_warning(None, 6186.2) is None
+    assert short_range_warning(18_000.0, 1800.0) is None
+    note = short_range_warning(2000.0, 1800.0)
     assert note is not None
-    assert note.startswith("--visible-from: from farther than 2000 m a figure 1800 m tall is not drawn")
+    assert note.startswith("--visible-from: beyond 2000 m a figure 1800 m tall is not drawn")
     assert "\n" not in note
 
 
@@ -104,7 +104,7 @@ def test_without_a_place_the_option_is_named() -> None:
 
 
 @pytest.mark.parametrize("distance", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_distance_that_is_none_is_refused(distance: float) -> None:
+def test_invalid_distances_are_errors(distance: float) -> None:
     with pytest.raises(ExportError, match="--visible-from"):
         tileset(asset(ZURICH), distance)
 
@@ -136,7 +136,7 @@ places = st.builds(
 
 @settings(max_examples=50, deadline=None)
 @given(places)
-def test_the_transform_tells_the_place_it_was_made_from(place: GeoPlacement) -> None:
+def test_the_transform_gives_the_place_it_was_made_from(place: GeoPlacement) -> None:
     found = placement_of_tile(tileset(asset(place))["root"]["transform"])
     feet = ecef_from_geodetic([[place.lon_deg, place.lat_deg, place.height_m]])
     again = ecef_from_geodetic([[found["lon_deg"], found["lat_deg"], found["height_m"]]])

@@ -96,7 +96,7 @@ def test_figures_anywhere_are_reached_once_and_inside_all_boxes(places: list[Geo
     ],
     ids=["north pole", "south pole", "antimeridian", "one place", "antipodes", "all round"],
 )
-def test_special_places_are_places_like_others(places: list[GeoPlacement]) -> None:
+def test_special_places_need_no_special_cases(places: list[GeoPlacement]) -> None:
     figures = [figure(place, number) for number, place in enumerate(places)]
     check_laws(figures, documents(figures))
 
@@ -249,9 +249,9 @@ def test_metadata_is_on_every_level_and_only_what_is_known() -> None:
     unknown = PlacedFigure("x", GeoPlacement(8.5, 47.4), LOW, HIGH, ("c.glb",), (0.0,))
     (document,) = documents([known, unknown]).values()
     assert document["metadata"] == {"class": "collection", "properties": {"figures": 2}}
-    said = {met.uri: met.tile["metadata"]["properties"] for met in contents({"tileset.json": document})}
-    assert said["a.glb"] == said["b.glb"]
-    assert said["a.glb"] == {
+    properties = {met.uri: met.tile["metadata"]["properties"] for met in contents({"tileset.json": document})}
+    assert properties["a.glb"] == properties["b.glb"]
+    assert properties["a.glb"] == {
         "name": "Bäuerin",
         "source": "map.png",
         "copyright": "© Zürich",
@@ -264,10 +264,10 @@ def test_metadata_is_on_every_level_and_only_what_is_known() -> None:
         "heading": 10.0,
         "figureHeight": 1.6,
     }
-    assert set(said["c.glb"]) == {"name", "longitude", "latitude", "height", "heading", "figureHeight"}
+    assert set(properties["c.glb"]) == {"name", "longitude", "latitude", "height", "heading", "figureHeight"}
 
 
-def test_version_1_0_says_the_same_in_extras() -> None:
+def test_version_1_0_has_the_same_values_in_extras() -> None:
     new = documents(crowd(3))["tileset.json"]
     old = documents(crowd(3), version="1.0")["tileset.json"]
     assert old["asset"]["version"] == "1.0"
@@ -278,7 +278,7 @@ def test_version_1_0_says_the_same_in_extras() -> None:
 
 
 @pytest.mark.parametrize("distance", [0.0, -5.0, math.nan, math.inf])
-def test_a_distance_that_is_none_is_refused(distance: float) -> None:
+def test_invalid_distances_are_errors(distance: float) -> None:
     with pytest.raises(ExportError, match="--visible-from"):
         documents(crowd(1), visible_from_m=distance)
 

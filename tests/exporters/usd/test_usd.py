@@ -35,7 +35,7 @@ def stage(request: pytest.FixtureRequest, tmp_path: Path) -> Usd.Stage:
     return Usd.Stage.Open(str(path))
 
 
-def test_stage_says_its_units_axes_and_root(stage: Usd.Stage) -> None:
+def test_stage_has_units_axes_and_root(stage: Usd.Stage) -> None:
     assert UsdGeom.GetStageMetersPerUnit(stage) == 1.0
     assert UsdGeom.GetStageUpAxis(stage) == "Y"
     assert stage.GetDefaultPrim().GetPath() == "/Figure"
@@ -79,7 +79,7 @@ def test_texture_feeds_the_surface(stage: Usd.Stage) -> None:
         assert np.array_equal(np.asarray(pixels), asset().mesh.texture.pixels)
 
 
-def test_place_is_there_in_both_schemas(stage: Usd.Stage) -> None:
+def test_place_is_in_both_schemas(stage: Usd.Stage) -> None:
     figure, origin = stage.GetDefaultPrim(), stage.GetPrimAtPath("/CesiumGeoreference")
     expected = {"longitude": 8.5417, "latitude": 47.3769, "height": 455.34}
     assert origin.GetTypeName() == "CesiumGeoreferencePrim"
@@ -219,15 +219,15 @@ def test_writing_twice_shows_the_second_version(tmp_path: Path) -> None:
     assert inspect(path)["vertices"] == len(np.unique(capsule(8, 2).solid_index))
 
 
-def test_a_file_that_ends_the_process_that_reads_it_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_crashes_its_reader_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_usd(asset(), tmp_path / "a.usda")
     dying = tmp_path / "python"
     dying.write_text("#!/bin/sh\nkill -ABRT $$\n")
     dying.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(dying))
     (finding,) = validate(tmp_path / "a.usda")
-    assert (finding.code, finding.message) == ("UNREADABLE", "USD breaks down on it (SIGABRT)")
-    with pytest.raises(ExportError, match=r"USD breaks down on it \(SIGABRT\)"):
+    assert (finding.code, finding.message) == ("UNREADABLE", "USD crashes on it (SIGABRT)")
+    with pytest.raises(ExportError, match=r"USD crashes on it \(SIGABRT\)"):
         inspect(tmp_path / "a.usda")
 
 

@@ -56,8 +56,14 @@ BAD = {
     "tiles without place": (("-o", "tiles/tileset.json"), "--lonlat"),
     "same output twice": (("-o", "a.glb", "-o", "./a.glb"), "twice"),
     "part of another output": (("--lonlat", "8", "47", "-o", "t/tileset.json", "-o", "t/drawn.glb"), "also a part"),
-    "not for the client": (("--profile", "cesiumjs", "-o", "a.usda"), "CesiumJS is to read"),
-    "tiles for Blender": (("--lonlat", "8", "47", "--profile", "blender", "-o", "t/"), "Blender is to read"),
+    "not for the client": (
+        ("--profile", "cesiumjs", "-o", "a.usda"),
+        "--profile cesiumjs cannot be combined with .usda; CesiumJS reads",
+    ),
+    "tiles for Blender": (
+        ("--lonlat", "8", "47", "--profile", "blender", "-o", "t/"),
+        "--profile blender cannot be combined with 3D Tiles; Blender reads",
+    ),
     "no such client": (("--profile", "maya"), "maya"),
     "long name": (("-o", "a" * 300 + ".glb"), "too long"),
     "altitude": (("--lonlat", "8", "47", "--altitude", "1e300"), "--altitude"),

@@ -186,7 +186,7 @@ def test_bad_usage_is_one_line(
 
 BAD_MODELS = {
     "missing": ("nobody.glb", (), "no such file"),
-    "damaged": ("damaged.glb", (), "no readable glTF"),
+    "damaged": ("damaged.glb", (), "not a valid glTF file"),
     "blend": ("balls.glb", ("--effects", "blend"), "drawing instead"),
     "joints": ("balls.glb", ("--keypoints", "x.json"), "finished model"),
     "parts": ("bare.glb", ("--mode", "parts"), "--no-evidence"),

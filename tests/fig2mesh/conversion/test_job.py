@@ -107,7 +107,7 @@ def test_without_textures_no_texture_network_runs(
     def refuse() -> None:
         raise AssertionError("a texture network was asked for")
 
-    monkeypatch.setattr("fig2mesh.texture.unseen.shipped", refuse)
+    monkeypatch.setattr("fig2mesh.texture.unobserved.shipped", refuse)
     arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--quality", "draft", "-q"]
     for name, textures in (("plain", "plain"), ("none", "none")):
         report = tmp_path / f"{name}.json"
@@ -117,7 +117,7 @@ def test_without_textures_no_texture_network_runs(
     stages = {stage["stage"]: stage for stage in json.loads(report.read_text())["stages"]}
     for stage in ("unwrap", "textures", "bake"):
         assert not stages[stage]["run"]
-        assert stages[stage]["why"] == "no texture is asked for"
+        assert stages[stage]["why"] == "no texture is requested"
     facts = inspect(tmp_path / "none.glb")
     assert facts["texture_px"] is None
     assert facts["solid"]
@@ -155,6 +155,7 @@ def digest(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
+@pytest.mark.slow
 def test_same_input_and_seed_same_bytes(finished: Run, tmp_path: Path) -> None:
     for name in ("first", "second"):
         out = tmp_path / name

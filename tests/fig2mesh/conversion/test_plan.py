@@ -54,7 +54,7 @@ def test_one_output_that_needs_normals_is_enough() -> None:
 def test_the_command_reads_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "no-such-figure.png", "--textures", "none", "--effect", "none"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert "skip  bake      no texture is asked for" in lines
+    assert "skip  bake      no texture is requested" in lines
     assert main(["plan", "no-such-figure.png", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert {stage["name"] for stage in found["stages"] if stage["runs"]} == {stage.name for stage in STAGES}

@@ -29,7 +29,7 @@ def pair() -> Body:
 
 
 def harsh(seed: int = 3) -> Body:
-    """What networks may give: limbs thinner than a cell, distances three times too large, ripples, a hollow grid."""
+    """Possible network fields: limbs thinner than a cell, distances three times too large, ripples, a hollow grid."""
     rng = np.random.default_rng(seed)
     parts = []
     for radius, n in ((0.004, 32), (0.012, 40), (0.05, 48), (0.1, 64)):
@@ -55,14 +55,14 @@ def towards(origins: NDArray[np.float64], targets: NDArray[np.float64]) -> Rays:
 
 
 def gap(first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.float64]:
-    """How far depths differ; infinite where only one ray met something, 0 where neither did."""
+    """Difference of depths; infinite where only one ray hit something, 0 where neither did."""
     met = np.isfinite(first) & np.isfinite(second)
     difference = np.subtract(first, second, out=np.zeros(len(first)), where=met)
     return np.where(np.isfinite(first) == np.isfinite(second), np.abs(difference), np.inf)
 
 
 def first_below(body: Body, rays: Rays, reach: float, samples: int) -> NDArray[np.float64]:
-    """Depth at which a fine march first sees the field not positive; infinite where it never does."""
+    """Depth at which a fine march first finds the field not positive; infinite if it never is."""
     depth = np.full(len(rays.origins), np.inf)
     for t in np.linspace(0, reach, samples)[::-1]:
         points = rays.origins.astype(np.float64) + t * rays.directions

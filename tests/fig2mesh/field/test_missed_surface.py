@@ -1,7 +1,7 @@
 """No surface is missed: 10,000 rays each through what is hard to hit, against a brute-force march.
 
 The march takes 35 to 60 samples a cell and so overlooks shorter chords. Where it does not confirm a hit, the field is
-looked at again about the place of the hit, every 5e-8.
+sampled again about the place of the hit, every 5e-8.
 """
 
 from __future__ import annotations

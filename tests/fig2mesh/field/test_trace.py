@@ -148,7 +148,7 @@ def test_no_rays_no_parts_no_surface():
         hits = trace(body, rays)
         assert not hits.hit.any()
         assert np.isinf(hits.depth).all()
-        assert hits.steps.sum() == 0  # not even looked at
+        assert hits.steps.sum() == 0  # not even visited
 
 
 def test_rays_from_inside_and_from_behind():
@@ -161,7 +161,7 @@ def test_rays_from_inside_and_from_behind():
 
 
 def test_a_part_cut_by_its_cube_ends_there():
-    """A ball in a cube too small for it: seen from the front, a square face."""
+    """A ball in a cube too small for it: a square face from the front."""
     part = analytic.sample(analytic.sphere((0, 0, 0), 0.5), 1, (0, 0, 0), 0.5, 24)
     body = Body((part,))
     rays = orthographic(0, size=(32, 32), height=0.6)

@@ -98,7 +98,7 @@ def test_czml_brings_its_models_and_folders_their_files(tmp_path: Path, figure: 
 CASES = [
     ("no.glb", None, "no such file"),
     ("picture.png", "x", r"unknown suffix \.png"),
-    ("cut.glb", "glTF", "no readable glTF"),
+    ("cut.glb", "glTF", "not a valid glTF file"),
     ("tileset.json", "{", "not JSON"),
     ("tileset.json", "[1]", "not a tileset"),
     ("tileset.json", json.dumps(tileset_of("gone.glb")), "gone.glb"),

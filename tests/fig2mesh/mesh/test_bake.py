@@ -1,4 +1,4 @@
-"""Baking: drawn pixels where the drawing sees the surface, no smearing through what is in front, no gaps."""
+"""Baking: drawn pixels where the drawing shows the surface, no smearing through what is in front, no gaps."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ SIDES = {
     TOP: ((0, 1, 0), (1, 0, 0)),
     BOTTOM: ((0, -1, 0), (1, 0, 0)),
 }
-"""Colour of a side, its outward normal, and its rightward axis seen from outside; ASSET."""
+"""Colour of a side, its outward normal, and its rightward axis as viewed from outside; ASSET."""
 
 
 def coloured_box(size: tuple[float, float, float] = (0.6, 1.8, 0.3)) -> TexturedMesh:
@@ -64,7 +64,7 @@ def box() -> TexturedMesh:
 )
 def test_each_direction_shows_its_side(box: TexturedMesh, yaw: float, pitch: float, colour: tuple[int, ...]) -> None:
     picture = render_mesh(box, yaw_deg=yaw, pitch_deg=pitch, size=(40, 60))
-    # Nothing but that side: the neighbours are seen edge-on.
+    # Nothing but that side: the neighbours are edge-on.
     inside = picture[picture[..., 3] == 255][:, :3]
     plain = inside[(inside < 226).all(axis=1)]
     assert len(plain) > 100

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.mesh.simplify import LEAST, deviation, simplify
+from fig2mesh.mesh.simplify import MIN_TRIANGLES, deviation, simplify
 from fig2mesh.mesh.topology import check_solid, face_components, face_vectors
 from fig2mesh.records import Mesh
 
@@ -16,7 +16,7 @@ def test_fewer_triangles_same_solid(name: str, share: float) -> None:
     target = int(len(mesh.faces) * share)
     result = simplify(mesh, target)
     assert_solid(result, solid.components, solid.genus)
-    assert len(result.faces) <= max(target, LEAST * solid.components) + 2
+    assert len(result.faces) <= max(target, MIN_TRIANGLES * solid.components) + 2
     if share == 0.5:
         assert check_solid(result).volume == pytest.approx(check_solid(mesh).volume, rel=0.02)
         outwards = solid.field.gradient(result.vertices[result.faces].mean(axis=1))
@@ -27,7 +27,7 @@ def test_a_small_piece_keeps_its_shape() -> None:
     mesh = simplify(closed("two spheres"), 400)
     sizes = np.bincount(face_components(mesh.faces))
     assert len(sizes) == 2
-    assert sizes.min() >= LEAST - 2
+    assert sizes.min() >= MIN_TRIANGLES - 2
     assert sizes.sum() <= 402
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fig2mesh.mesh.simplify import deviation, simplify
-from fig2mesh.mesh.slivers import LEAST_QUALITY, REACHES, triangle_quality, without_slivers
+from fig2mesh.mesh.slivers import MIN_QUALITY, REACHES, triangle_quality, without_slivers
 from fig2mesh.mesh.topology import as_mesh, check_solid, face_vectors
 from fig2mesh.records import Mesh
 
@@ -61,7 +61,7 @@ def test_slivers_go_and_the_solid_stays(name: str, kinds: list[tuple[float, ...]
     before = bad.faces.tobytes()
     good = without_slivers(bad)
     assert bad.faces.tobytes() == before
-    assert least(good) >= LEAST_QUALITY
+    assert least(good) >= MIN_QUALITY
     assert_solid(good, 1, check_solid(sound).genus)
     assert deviation(good, bad)[1] <= REACHES[-1] * edge(bad) * 1.2  # it is judged at the corners and middles
     assert check_solid(good).volume == pytest.approx(check_solid(bad).volume, rel=1e-3)

@@ -30,7 +30,7 @@ def test_volume_does_not_suffer_from_distance_to_the_origin() -> None:
     far = check_solid(moved(BOX, 1000.0))
     # float32 coordinates step by 6e-5 out there
     assert far.volume == pytest.approx(6, rel=1e-4)
-    assert far.least_volume == pytest.approx(6, rel=1e-4)
+    assert far.min_volume == pytest.approx(6, rel=1e-4)
 
 
 def test_an_open_box() -> None:

@@ -7,14 +7,14 @@ from fig2mesh.field.body import Body
 from fig2mesh.mesh.bake import drawn_faces
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.topology import edge_pairs, face_areas
-from fig2mesh.mesh.unwrap import PATCH, Drawn, unwrap
+from fig2mesh.mesh.unwrap import MAX_PATCH, Drawn, unwrap
 from fig2mesh.records import Mesh, UvMesh
 
 from .solids import SOLIDS, closed
 
 
 def texel_areas(mesh: UvMesh) -> np.ndarray:
-    """(F,) areas in the picture, whose rows go down: positive where it shows a face as it looks from outside."""
+    """(F,) areas in the picture, whose rows go down: positive where it shows a face as viewed from outside."""
     corners = mesh.uv.astype(np.float64)[mesh.faces] * mesh.atlas_size
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return (first[:, 1] * second[:, 0] - first[:, 0] * second[:, 1]) / 2
@@ -31,7 +31,7 @@ def charts(mesh: UvMesh) -> np.ndarray:
 
 
 def painted(mesh: UvMesh, scale: int) -> tuple[np.ndarray, bool]:
-    """The chart seen at each point of a fine raster, -1 for none; and whether two charts claim one point."""
+    """Chart at each point of a fine raster, -1 for none; and whether two charts claim one point."""
     size = mesh.atlas_size[0] * scale
     picture, clash = np.full((size, size), -1), False
     for face, chart in zip(mesh.uv.astype(np.float64)[mesh.faces] * size, charts(mesh), strict=True):
@@ -89,7 +89,7 @@ def test_the_texture_is_used() -> None:
 
 def test_a_mesh_of_several_patches() -> None:
     solid = isosurface(Body(mannequin(24)), spacing=0.02)
-    assert len(solid.faces) > PATCH
+    assert len(solid.faces) > MAX_PATCH
     mesh = unwrap(solid, texture_size=512)
     assert np.array_equal(mesh.solid_index[mesh.faces], solid.faces)
     assert (texel_areas(mesh) >= 0).all()
@@ -177,7 +177,7 @@ def test_the_rest_has_no_more_texels_than_what_is_drawn() -> None:
 
 
 def test_faces_behind_others_are_not_drawn() -> None:
-    """A small ball before a large one: its shadow on the large one is not seen, nor are both backs."""
+    """A small ball before a large one: its shadow on the large one is not visible, nor are both backs."""
     solid = closed("sphere")
     centred = solid.vertices - solid.vertices.mean(axis=0)
     solid = Mesh(centred, solid.faces)

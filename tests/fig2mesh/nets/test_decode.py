@@ -119,7 +119,7 @@ def test_missing_and_broken_weights_are_told(tmp_path, monkeypatch):
         PART_WEIGHTS.shipped(DisnShape.of("hand", "two-stream"))
     path = PART_WEIGHTS.path(DisnShape.of("hand", "two-stream"), tmp_path)
     path.write_bytes(b"nothing of the kind")
-    with pytest.raises(InputError, match="no readable weights"):
+    with pytest.raises(InputError, match="not a readable weights file"):
         PART_WEIGHTS.shipped(DisnShape.of("hand", "two-stream"))
     weights.save(path, {"x": torch.zeros(2)}, {"shape": {"kind": "hand", "variant": "two-stream"}})
     with pytest.raises(InputError, match="not the weights"):

@@ -116,10 +116,10 @@ def test_one_sample_is_learned(variant):
 def test_local_features_follow_the_picture():
     """Row 0 of a mask is at y = +1, column 0 at x = -1: a lone pixel is felt there, not at its mirror images."""
     net = made("hand", "two-stream")
-    spot = np.zeros((1, 64, 64), bool)
-    spot[0, 4, 8] = True
-    features = net.encode(as_input(spot), torch.zeros(1, 2, 3))
-    empty = net.encode(as_input(spot & False), torch.zeros(1, 2, 3))
+    dot = np.zeros((1, 64, 64), bool)
+    dot[0, 4, 8] = True
+    features = net.encode(as_input(dot), torch.zeros(1, 2, 3))
+    empty = net.encode(as_input(dot & False), torch.zeros(1, 2, 3))
     x, y = 8.5 / 32 - 1, 1 - 4.5 / 32
     there = torch.tensor([[[x, y, 0.0], [-x, y, 0.0], [x, -y, 0.0], [-x, -y, 0.0]]])
     change = (net.local_share(features, there) - net.local_share(empty, there)).norm(dim=-1)[0]

@@ -1,4 +1,4 @@
-"""The size networks, and the data they learn from: boxes and masks as seen from four sides."""
+"""The size networks, and the data they learn from: boxes and masks from four sides."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_a_right_part_is_a_mirrored_left_one() -> None:
     net = network("foot")
     left, right = part_size(net, PART["l_foot"], joints()), part_size(net, PART["r_foot"], mirrored)
     np.testing.assert_allclose(left[0], right[0], rtol=1e-5)
-    with pytest.raises(ValueError, match="no foot"):
+    with pytest.raises(ValueError, match="not a foot"):
         part_size(net, PART["l_hand"], joints())
 
 

@@ -51,12 +51,12 @@ QUICK = settings(max_examples=150, suppress_health_check=[HealthCheck.function_s
 
 def read(path: Path, document: Any) -> None:
     path.write_text(json.dumps(document))
-    said = ""
+    message = ""
     try:
         assert np.isfinite(read_keypoints(path, "figure.png").points_px).all()
     except FigureError as error:
-        said = str(error)
-    assert said.isprintable()
+        message = str(error)
+    assert message.isprintable()
 
 
 @given(ANYTHING)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fig2mesh.parse.infer import infer_figure, look, on_light, spread, square
+from fig2mesh.parse.infer import infer_figure, on_light, predict, spread, square
 from fig2mesh.parse.picture import read_rgba
 from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
-from fig2mesh.training.evaluate.parser import GROUNDS, bare, drawings, evaluate_parse, measure
+from fig2mesh.training.evaluate.parser import BACKGROUNDS, bare, drawings, evaluate_parse, measure
 
 FARMER = Path(__file__).parents[3] / "examples" / "figures" / "farmer"
 
@@ -33,17 +33,17 @@ def test_the_farmer_is_found_on_any_ground(ground: str, least: float) -> None:
 def test_a_mirrored_picture_has_the_mirrored_answer(farmer: np.ndarray) -> None:
     size = farmer.shape[1], farmer.shape[0]
     centre, edge = np.array(size) / 2, 1.1 * max(size)
-    seen, turned = look(farmer, centre, edge), look(farmer[:, ::-1], [size[0] - centre[0], centre[1]], edge)
+    prediction, turned = predict(farmer, centre, edge), predict(farmer[:, ::-1], [size[0] - centre[0], centre[1]], edge)
     # Resampling rounds to whole colours.
-    assert np.abs(turned.likely[:, ::-1] - seen.likely).mean() < 0.002
-    assert np.abs(turned.heat[list(JOINT_MIRROR)][:, :, ::-1] - seen.heat).max() < 0.05
+    assert np.abs(turned.likely[:, ::-1] - prediction.likely).mean() < 0.002
+    assert np.abs(turned.heat[list(JOINT_MIRROR)][:, :, ::-1] - prediction.heat).max() < 0.05
 
 
 def test_likelihoods_are_likelihoods(farmer: np.ndarray) -> None:
-    seen = look(farmer, np.array(farmer.shape[1::-1]) / 2, float(max(farmer.shape)))
-    assert np.allclose(seen.heat.sum(axis=(1, 2)), 1, atol=1e-4)
-    assert np.allclose(seen.labels.sum(axis=0), 1, atol=1e-4)
-    assert 0 <= seen.likely.min() <= seen.likely.max() <= 1
+    prediction = predict(farmer, np.array(farmer.shape[1::-1]) / 2, float(max(farmer.shape)))
+    assert np.allclose(prediction.heat.sum(axis=(1, 2)), 1, atol=1e-4)
+    assert np.allclose(prediction.labels.sum(axis=0), 1, atol=1e-4)
+    assert 0 <= prediction.likely.min() <= prediction.likely.max() <= 1
 
 
 def test_parts_lie_in_the_mask_and_joints_on_the_picture(farmer: np.ndarray) -> None:
@@ -81,18 +81,18 @@ def test_nothing_is_found_on_an_empty_sheet() -> None:
 def test_a_square_beyond_the_picture_is_filled_with_its_rim() -> None:
     picture = np.full((10, 20, 3), 40, np.uint8)
     picture[3:7, 5:9] = 200
-    seen = square(picture, np.array([-10.0, -15.0]), 40.0, 80)
-    assert seen.shape == (80, 80, 3)
-    assert (seen[:20] == 40).all()
-    assert (seen[38:42, 32:36] == 200).all()
+    found = square(picture, np.array([-10.0, -15.0]), 40.0, 80)
+    assert found.shape == (80, 80, 3)
+    assert (found[:20] == 40).all()
+    assert (found[38:42, 32:36] == 200).all()
 
 
 def test_cells_spread_over_the_picture_where_they_were_seen() -> None:
     picture = np.zeros((60, 40, 3), np.uint8)
-    seen = look(picture, np.array([20.0, 30.0]), 64.0)
+    prediction = predict(picture, np.array([20.0, 30.0]), 64.0)
     values = np.zeros((16, 16), np.float32)
     values[8:, 8:] = 1
-    out = spread(values, seen, (60, 40))
+    out = spread(values, prediction, (60, 40))
     assert out[45, 30] == 1
     assert out[10, 30] == 0
 
@@ -105,4 +105,4 @@ def test_the_table_names_every_drawing(tmp_path: Path) -> None:
     text = evaluate_parse(tmp_path)
     assert "| one |" in text
     assert "| mean |" in text
-    assert all(f"| {ground} |" in text for ground in GROUNDS)
+    assert all(f"| {ground} |" in text for ground in BACKGROUNDS)

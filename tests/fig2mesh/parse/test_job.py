@@ -102,7 +102,7 @@ def test_given_files_are_kept(tmp_path: Path) -> None:
 REFUSED = {
     "there": (["parse", "white.png", "-o", "there"], "mask.png: exists; pass --overwrite"),
     "no folder": (["parse", "white.png", "-o", "white.png"], "is no folder"),
-    "no figure": (["parse", "white.png", "-o", "new"], "no figure is found in it"),
+    "no figure": (["parse", "white.png", "-o", "new"], "no figure found"),
     "no picture": (["parse", "none.png", "-o", "new"], "no such file"),
 }
 
@@ -117,7 +117,7 @@ def test_refusals_are_one_line(
     Path("there/mask.png").write_bytes(b"")
     arguments, message = REFUSED[case]
     assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert len(said.strip().splitlines()) == 1
+    output = capsys.readouterr().err
+    assert message in output
+    assert len(output.strip().splitlines()) == 1
     assert not Path("new").exists()

@@ -145,7 +145,7 @@ def test_other_shapes_in_the_file_do_not_matter(tmp_path: Path) -> None:
     [
         ({"shapes": []}, "no joints with known names"),
         ({"annotations": [{"keypoints": [1, 2]}], "categories": [{"keypoints": ["nose"]}]}, "2 numbers for 1"),
-        ({"shapes": [{"label": "head", "points": [[1, float("nan")]]}]}, "NaN is no number"),
+        ({"shapes": [{"label": "head", "points": [[1, float("nan")]]}]}, "NaN is not a number"),
         ({"shapes": [{"label": "head", "points": []}]}, "without coordinates"),
         ({"shapes": [{"label": "head", "points": [[1, 2]]}] * 2}, "head twice"),
         ({"shapes": [{"label": "head", "points": [[1, 2]]}]}, "joints missing: neck, thorax, pelvis"),

@@ -40,7 +40,7 @@ def test_mirrored_maps_have_mirrored_joints() -> None:
 def test_one_joint_of_a_limb_on_the_wrong_side_is_put_back() -> None:
     heat = bells(PLACES)
     left, right = JOINT["l_elbow"], JOINT["r_elbow"]
-    # Both sides are about as likely for the elbows alone; the rest of the arm tells.
+    # Both sides are about as likely for the elbows alone; the rest of the arm decides.
     heat[[left, right]] = 0.45 * heat[[left, right]] + 0.55 * heat[[right, left]]
     places, _ = decode(heat, 0.95)
     assert np.abs(places - PLACES).max() * CELLS < 0.5
@@ -71,28 +71,28 @@ def test_joints_beside_the_silhouette_move_onto_it() -> None:
 
 
 @pytest.fixture
-def seen() -> dict[str, np.ndarray]:
+def skeleton() -> dict[str, np.ndarray]:
     mask = np.ones((300, 200), bool)
     joints = np.array([JOINTS[name] for name in JOINT], float)
     return {"joints": joints, "sure": np.full(21, 0.9), "visible": np.ones(21, bool), "mask": mask}
 
 
-def test_a_plausible_skeleton_has_no_doubts(seen: dict[str, np.ndarray]) -> None:
-    assert doubts(**seen) == []
+def test_a_plausible_skeleton_has_no_doubts(skeleton: dict[str, np.ndarray]) -> None:
+    assert doubts(**skeleton) == []
 
 
-def test_doubts_name_the_joints(seen: dict[str, np.ndarray]) -> None:
-    seen["sure"][JOINT["l_hand"]] = 0.1
-    seen["mask"][:, :60] = False
-    seen["joints"][JOINT["l_elbow"]] = 132, 90
-    said = "; ".join(doubts(**seen))
-    assert "unsure of l_hand" in said
-    assert "r_elbow" in said
-    assert "outside the silhouette" in said
-    assert "upper arms of very different lengths" in said
+def test_doubts_name_the_joints(skeleton: dict[str, np.ndarray]) -> None:
+    skeleton["sure"][JOINT["l_hand"]] = 0.1
+    skeleton["mask"][:, :60] = False
+    skeleton["joints"][JOINT["l_elbow"]] = 132, 90
+    found = "; ".join(doubts(**skeleton))
+    assert "unsure of l_hand" in found
+    assert "r_elbow" in found
+    assert "outside the silhouette" in found
+    assert "upper arms of very different lengths" in found
 
 
-def test_hidden_joints_are_not_doubted(seen: dict[str, np.ndarray]) -> None:
-    seen["sure"][JOINT["l_hand"]] = 0.1
-    seen["visible"][JOINT["l_hand"]] = False
-    assert doubts(**seen) == []
+def test_hidden_joints_are_not_doubted(skeleton: dict[str, np.ndarray]) -> None:
+    skeleton["sure"][JOINT["l_hand"]] = 0.1
+    skeleton["visible"][JOINT["l_hand"]] = False
+    assert doubts(**skeleton) == []

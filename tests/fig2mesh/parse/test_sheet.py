@@ -88,7 +88,7 @@ def test_two_people_on_a_sheet_are_found_and_become_models(tmp_path: Path) -> No
             for joint, index in JOINT.items()
         ]
         assert np.mean(right) > 0.75, name
-        # The same file is COCO: the box tells which figure is meant.
+        # The same file is COCO: the box selects the figure.
         again = read_figure(path, mask=folder / "mask.png", keypoints=out / "figures.json", bbox=box)
         np.testing.assert_allclose(again.joints_px, figure.joints_px, atol=0.02)
         assert len(annotation["segmentation"]) >= 1
@@ -108,9 +108,9 @@ def test_refusals_are_one_line(case: str, tmp_path: Path, capsys: pytest.Capture
     (tmp_path / "out" / "figures.json").write_text("{}")
     options, message = REFUSED[case]
     assert main(["parse", str(tmp_path / "sheet.png"), "-o", str(tmp_path / "out"), *options]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert len(said.strip().splitlines()) == 1
+    output = capsys.readouterr().err
+    assert message in output
+    assert len(output.strip().splitlines()) == 1
 
 
 def test_a_blank_sheet_has_nobody(tmp_path: Path) -> None:

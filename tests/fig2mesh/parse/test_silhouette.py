@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from fig2mesh.parse.colours import by_colour, guided
-from fig2mesh.parse.silhouette import agreement, plain_sheet, refine
+from fig2mesh.parse.silhouette import agreement, plain_background, refine
 
 SIDE = 240
 Y, X = np.mgrid[:SIDE, :SIDE] + 0.5
@@ -18,7 +18,7 @@ def disc(x: float, y: float, radius: float) -> np.ndarray:
 
 
 def guess(mask: np.ndarray, blurred: float = 7.0) -> np.ndarray:
-    """What a network on a coarse grid would say."""
+    """Prediction of a network on a coarse grid."""
     return ndimage.gaussian_filter(mask.astype(np.float32), blurred)
 
 
@@ -75,7 +75,7 @@ def test_a_busy_ground_is_no_sheet_and_colours_decide() -> None:
     ground = ndimage.zoom(rng.uniform(90, 255, (24, 24, 3)), (10, 10, 1), order=0)
     picture = np.where(BODY[..., None], [170, 30, 40], ground).astype(np.uint8)
     likely = guess(BODY)
-    sheet = plain_sheet(picture.astype(np.float32), likely)
+    sheet = plain_background(picture.astype(np.float32), likely)
     assert sheet is None or sheet.share < 0.5
     assert iou(refine(picture, likely), BODY) > iou(likely > 0.5, BODY)
 

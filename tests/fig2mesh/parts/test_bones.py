@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fig2mesh.image_frame import image_frame
-from fig2mesh.parts.bones import AT_HEM, HANGING, STEEPEST, Bones, core_bones, hem_depth, out_of_cloth, slopes2
+from fig2mesh.parts.bones import AT_HEM, MAX_CLOTH_SLOPE, MAX_SLOPE, Bones, core_bones, hem_depth, out_of_cloth, slopes2
 from fig2mesh.parts.canvas import Canvas, make_canvas
 from fig2mesh.parts.depth import mid_surface
 from fig2mesh.parts.limbs import make_limb
@@ -59,8 +59,8 @@ def test_squared_slope_is_bounded_and_defined_for_bones_of_no_length() -> None:
     """A forearm that points at the viewer is drawn as a dot: its slope has no end."""
     dot = slopes2(np.zeros((5, 2)), np.linspace(0.0, 0.3, 5))
     assert np.isfinite(dot).all()
-    np.testing.assert_allclose(dot, STEEPEST**2)
-    np.testing.assert_allclose(slopes2(*chain(20.0)), STEEPEST**2)
+    np.testing.assert_allclose(dot, MAX_SLOPE**2)
+    np.testing.assert_allclose(slopes2(*chain(20.0)), MAX_SLOPE**2)
     assert slopes2(np.zeros((1, 2)), np.zeros(1)).tolist() == [0.0]
 
 
@@ -100,7 +100,7 @@ def test_core_bones_run_along_the_spine_and_the_limbs_of_the_core() -> None:
     assert bones.points.shape == (len(bones.depth), 2)
     assert bones.slope2.shape == bones.depth.shape
     assert (bones.slope2 >= 0).all()
-    assert (bones.slope2 <= STEEPEST**2).all()
+    assert (bones.slope2 <= MAX_SLOPE**2).all()
     wrist = joints[JOINT["l_wrist"]]
     nearest = np.argmin(np.linalg.norm(bones.points - wrist[:2], axis=1))
     assert bones.depth[nearest] == pytest.approx(wrist[2], abs=0.02)
@@ -124,11 +124,11 @@ def test_cloth_hangs_nearly_plumb(forward: float) -> None:
     assert parts.garment.any()
     assert any(limb.cloth for limb in parts.limbs)
     hem = hem_depth(parts, joints, 0.0, 0.6)
-    assert abs(hem) <= HANGING * 0.6 + 1e-12
+    assert abs(hem) <= MAX_CLOTH_SLOPE * 0.6 + 1e-12
     assert np.sign(hem) == np.sign(forward)
     bones = core_bones(canvas, parts, joints)
     below = bones.points[:, 1] < joints[JOINT["l_hip"], 1] - 0.1
-    assert np.abs(bones.depth[below]).max() <= HANGING * 0.7
+    assert np.abs(bones.depth[below]).max() <= MAX_CLOTH_SLOPE * 0.7
 
 
 def test_without_legs_below_cloth_hangs_plumb() -> None:
@@ -148,5 +148,5 @@ def test_a_leg_leaves_its_garment_inside_of_it(forward: float) -> None:
         if not limb.cloth:
             assert moved is limb
             continue
-        assert abs(moved.depth[0]) <= HANGING * drop + AT_HEM * widest / 2
+        assert abs(moved.depth[0]) <= MAX_CLOTH_SLOPE * drop + AT_HEM * widest / 2
         np.testing.assert_allclose(np.diff(moved.depth), np.diff(limb.depth), atol=1e-12)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.parts.ends import DOWN, LEAST_WIDTH, Ends, clip_distance, flat_ends
+from fig2mesh.parts.ends import DOWN, MIN_WIDTH, Ends, clip_distance, flat_ends
 from fig2mesh.parts.rim import rim_distance
 
 PITCH = 0.006
@@ -41,7 +41,7 @@ def test_a_box_ends_at_its_bottom_edge() -> None:
     assert (ends.source[inner] == BOTTOM - 1).all()
     assert (ends.source[:LEFT] == -1).all()
     assert (ends.source[RIGHT:] == -1).all()
-    # Corners look sideways too; what they take from the end is no more than they are smoothed.
+    # Corners point sideways too; they shorten the end by no more than they are smoothed.
     assert (ends.source >= 0).sum() >= RIGHT - LEFT - 12
 
 
@@ -78,12 +78,12 @@ def test_only_what_may_end_flat_does() -> None:
 
 
 def test_points_and_edges_that_look_up_are_no_ends() -> None:
-    thin = sheet(np.abs(COLUMNS - 80) - 0.3 * LEAST_WIDTH / PITCH + np.maximum(0, ROWS - 90) + np.maximum(0, 20 - ROWS))
+    thin = sheet(np.abs(COLUMNS - 80) - 0.3 * MIN_WIDTH / PITCH + np.maximum(0, ROWS - 90) + np.maximum(0, 20 - ROWS))
     assert flat_ends(thin, thin.inside, thin.inside) is None
     # A wedge that stands on its tip has two sides steeper than the limit, and no bottom.
     wedge = sheet((np.abs(COLUMNS - 80) - 0.4 * (110 - ROWS)) / np.hypot(1, 0.4) + 1e3 * (ROWS < 30))
     ends = flat_ends(wedge, wedge.inside, wedge.inside)
-    assert ends is None or (ends.source >= 0).sum() * PITCH < 2 * LEAST_WIDTH
+    assert ends is None or (ends.source >= 0).sum() * PITCH < 2 * MIN_WIDTH
 
 
 def test_scallops_are_bridged() -> None:

@@ -1,4 +1,4 @@
-"""What the part networks are asked, and what is done with what they answer."""
+"""Inputs of the part networks, and the use of their outputs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fig2mesh.nets.part_size import PartSizeNet, SizeShape
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.parts.network import LEAST_EDGE, MASK, ROOM, hidden_parts, network_inputs, part_cubes, part_mask
+from fig2mesh.parts.network import MASK, MIN_EDGE, ROOM, hidden_parts, network_inputs, part_cubes, part_mask
 from fig2mesh.parts.split import Layer, Split
 from fig2mesh.records import PartSdf
 from fig2mesh.skeleton import BODY_PARTS, KINDS, PART, part_centre
@@ -30,7 +30,7 @@ def disc(centre: tuple[float, float], radius: float) -> NDArray[np.bool_]:
 
 @pytest.fixture(scope="module")
 def sizes() -> dict[str, PartSizeNet]:
-    """Untrained networks: what they say is arbitrary."""
+    """Untrained networks: their output is arbitrary."""
     return {kind: PartSizeNet(SizeShape(kind)) for kind in KINDS}
 
 
@@ -76,7 +76,7 @@ def test_cubes_hold_what_is_drawn(sizes: dict[str, PartSizeNet]) -> None:
     rim = np.ones_like(drawn)
     rim[1:-1, 1:-1] = False
     assert not drawn[rim].any()
-    assert all(edge >= LEAST_EDGE for _, edge in cubes.values())
+    assert all(edge >= MIN_EDGE for _, edge in cubes.values())
 
 
 def test_a_hidden_part_is_as_large_as_its_twin(sizes: dict[str, PartSizeNet]) -> None:

@@ -44,7 +44,7 @@ def outline(figure: Figure) -> Outline:
 
 
 def front_mask(body: Body, figure: Figure, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which of every `step`-th pixel centres have the body behind them, and the drawn mask there."""
+    """Every `step`-th pixel centre: True where the body is behind it, and the drawn mask there."""
     frame = image_frame(figure)
     rows, columns = np.mgrid[0 : figure.mask.shape[0] : step, 0 : figure.mask.shape[1] : step]
     xy = frame.figure_from_image(np.stack([columns + 0.5, rows + 0.5], axis=-1))
@@ -121,9 +121,9 @@ def test_hidden_forearm_goes_behind(figure: Figure) -> None:
     for name, x, y in (("l_wrist", 100, 140), ("l_hand", 92, 142), ("l_elbow", 130, 125)):
         joints[JOINT[name]] = 2 * x, 2 * y
     depths = []
-    for seen in (True, False):
+    for shown in (True, False):
         visible = figure.visible.copy()
-        visible[[JOINT["l_wrist"], JOINT["l_hand"], JOINT["l_elbow"]]] = seen
+        visible[[JOINT["l_wrist"], JOINT["l_hand"], JOINT["l_elbow"]]] = shown
         posed = Figure("posed", figure.rgba, figure.mask, joints, visible, figure.part_labels)
         (hand,) = [part for part in infer(posed).parts if PART_NAMES[part.part] == "l_hand"]
         depths.append(float(hand.centre[2]))

@@ -1,4 +1,4 @@
-"""Who owns the pixels of a silhouette: laws on a disc (the core) and a bar (a limb) across it."""
+"""Assignment of the pixels of a silhouette to layers: laws on a disc (the core) and a bar (a limb) across it."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.canvas import Canvas, make_canvas, raster_distance
 from fig2mesh.parts.inflate import inflate
-from fig2mesh.parts.rim import LEAST_SLOPE, OVERLAP, RIM_BLUR, extended, rim_distance
+from fig2mesh.parts.rim import MIN_SLOPE, OVERLAP, RIM_BLUR, extended, rim_distance
 from tests.drawn import Sketch
 
 PITCH = 0.008
@@ -41,7 +41,7 @@ def test_rim_of_a_drawn_disc_is_known_to_a_fraction_of_a_pixel() -> None:
     # A picture knows its contour to half a pixel, an eighth of the canvas's.
     assert error.max() < 0.15 * drawn.pitch
     stairs = np.abs(raster_distance(drawn.inside) * drawn.pitch - exact)[near]
-    assert error.mean() < 0.4 * stairs.mean(), "the canvas's own pixels tell less"
+    assert error.mean() < 0.4 * stairs.mean(), "the canvas's own pixels are less exact"
 
 
 @pytest.mark.parametrize("radius", [20.3, 31.7])
@@ -96,7 +96,7 @@ def test_inflation_that_knows_its_rim_is_exact_between_pixels(radius: float, loa
 
 
 def test_inflation_grows_without_steps_with_the_radius() -> None:
-    """A rim that moves by a tenth of a pixel moves the middle by as much as the formula says, not by nought or one."""
+    """A rim that moves by a tenth of a pixel moves the middle by as much as the formula gives, not by nought or one."""
     radii = np.arange(15.0, 16.05, 0.1)
     middles = []
     for radius in radii:
@@ -139,9 +139,9 @@ def test_continuous_at_any_rim() -> None:
 
 
 def test_the_thinnest_strokes_keep_a_least_slope() -> None:
-    """What is hardly thicker than a pixel is made deeper than wide, so that grids hold it."""
+    """Strokes hardly thicker than a pixel are made deeper than wide, so that grids hold them."""
     x = np.abs(np.arange(SIDE) - SIDE // 2) - 1.2
     distance = np.broadcast_to(x, (SIDE, SIDE)) * PITCH
     u = extended(distance, np.zeros((SIDE, SIDE)), PITCH)
-    assert u[SIDE // 2, SIDE // 2] == pytest.approx(LEAST_SLOPE * 1.2 * PITCH)
+    assert u[SIDE // 2, SIDE // 2] == pytest.approx(MIN_SLOPE * 1.2 * PITCH)
     assert (u[distance > 0] < 0).all()

@@ -7,7 +7,7 @@ import pytest
 
 from fig2mesh.asset_frame import asset_from_figure
 from fig2mesh.image_frame import image_frame
-from fig2mesh.pose.prior import FORESHORTENED, MOST, lift
+from fig2mesh.pose.prior import FORESHORTENED, MAX_DEPTH_STEP, lift
 from fig2mesh.records import Figure, Pose3D
 from fig2mesh.skeleton import FIGURE_HEIGHT, JOINT, JOINT_NAMES
 from tests.drawn import JOINTS, draw_figure
@@ -65,7 +65,9 @@ def test_small_differences_are_the_draughtsmans() -> None:
 
 def test_depth_is_bounded() -> None:
     joints = lift(figure(l_knee=JOINTS["l_hip"], l_ankle=JOINTS["l_hip"]), image_frame(figure())).joints
-    assert np.abs(np.diff(joints[[JOINT["l_hip"], JOINT["l_knee"], JOINT["l_ankle"]], 2])).max() <= MOST + 1e-6
+    assert (
+        np.abs(np.diff(joints[[JOINT["l_hip"], JOINT["l_knee"], JOINT["l_ankle"]], 2])).max() <= MAX_DEPTH_STEP + 1e-6
+    )
 
 
 def test_coincident_joints_are_no_error() -> None:

@@ -12,7 +12,7 @@ from fig2mesh.field.compiled import THREADS_VARIABLE
 from fig2mesh.field.reference import trace_reference
 from fig2mesh.field.trace import trace
 from fig2mesh.records import Hits
-from fig2mesh.render.frame import Frame, render_frame
+from fig2mesh.render.frame import RenderedFrame, render_frame
 from tests.fig2mesh.field.fields import harsh, pair
 
 
@@ -31,7 +31,7 @@ CAMERAS = [
 BODIES = {"pair": pair(), "harsh": harsh(), "mannequin": Body(analytic.mannequin(32))}
 
 
-def agree(frame: Frame, hits: Hits, least: float = 0.999) -> None:
+def agree(frame: RenderedFrame, hits: Hits, least: float = 0.999) -> None:
     """Frames reckon in float64 from the camera, rays are float32: a millionth of the distance apart."""
     assert frame.parts is not None
     assert frame.normals is not None

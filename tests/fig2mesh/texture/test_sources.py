@@ -1,4 +1,4 @@
-"""Plain colours for unseen sides: fills stay, ink and faces go."""
+"""Plain colours for hidden sides: fills stay, ink and faces go."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def body(rng: np.random.Generator, shirt_sleeve: bool = True) -> dict[str, np.nd
     }
 
 
-def look(model: dict[str, np.ndarray], view: str = "front", size: int = 256) -> tuple[Layers, Face | None]:
+def render_view(model: dict[str, np.ndarray], view: str = "front", size: int = 256) -> tuple[Layers, Face | None]:
     """Layers of a view, and the face when it is to be seen."""
     turn = axes(VIEW_YAW_DEG[view])
     vertices, faces = model["vertices"] @ turn.T, model["faces"]

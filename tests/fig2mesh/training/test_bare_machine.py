@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from fig2mesh.training.bodies.pack import save_pack
 from tests.fig2mesh.training.figures import capsule_pack
 
@@ -25,12 +27,12 @@ sys.meta_path.insert(0, Bare())
 from pathlib import Path
 import numpy as np
 from fig2mesh.nets.disn import DisnShape
-from fig2mesh.training.samples.build import Wanted, build
+from fig2mesh.training.samples.build import BuildOptions, build
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_parts import PartSampling, train_parts
 
 folder = Path(sys.argv[1])
-build(folder / "pack.npz", folder / "data", Wanted(bodies=1, valid=0))
+build(folder / "pack.npz", folder / "data", BuildOptions(bodies=1, valid=0))
 shape, few = DisnShape("hand"), PartSampling(points=64)
 scores = train_parts(folder / "data", "hand", shape, folder / "run", Schedule(batch=4), few, epochs=1)
 assert np.isfinite(scores["loss"]), scores
@@ -39,6 +41,7 @@ print("done")
 """
 
 
+@pytest.mark.slow
 def test_samples_and_a_training_step_need_only_numpy_and_torch(tmp_path: Path) -> None:
     save_pack(capsule_pack(), tmp_path / "pack.npz")
     done = subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path)], capture_output=True, text=True, check=False)

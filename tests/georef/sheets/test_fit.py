@@ -13,7 +13,7 @@ from scipy.interpolate import RBFInterpolator
 
 from georef.errors import PlacementError
 from georef.sheets.controls import FloatArray
-from georef.sheets.fit import LEAST, METHODS, fit
+from georef.sheets.fit import METHODS, MIN_POINTS, fit
 from georef.sheets.hull import convex_hull, nearest_in
 
 SHEET = 8000.0
@@ -54,7 +54,7 @@ def truth(method: str, pixels: FloatArray) -> FloatArray:
 @pytest.mark.parametrize("method", [m for m in METHODS if m != "tps"])
 @pytest.mark.parametrize("extra", [0, 1, 20])
 def test_without_noise_the_map_is_found_exactly(method: str, extra: int) -> None:
-    pixels, probe = spread(LEAST[method] + extra), spread(50, seed=1)
+    pixels, probe = spread(MIN_POINTS[method] + extra), spread(50, seed=1)
     found = fit(method, pixels, truth(method, pixels))
     # 20 km in float64 coordinates of 2.7e6 m: rounding is 5e-10 m, and few points see it enlarged.
     assert np.abs(found.apply(probe) - truth(method, probe)).max() < 1e-5
@@ -93,7 +93,7 @@ def test_residuals_and_errors_follow_their_statistics(method: str) -> None:
         mahalanobis += float(error @ np.linalg.solve(covariance, error))
         noisy = found.apply(pixels) - exact
         squares += float((noisy**2).sum())
-    # The fitted part of the noise has p degrees of freedom, what is left over 2n - p: looked at from the fitted side.
+    # The fitted part of the noise has p degrees of freedom, the residuals 2n - p; tested by the fitted part.
     parts = ((squares / sigma**2, draws * clean.parameters), (mahalanobis, draws * 2))
     for value, freedom in parts:
         # One in a million draws of a right fit would be outside; a wrong number of parameters is far outside.
@@ -227,7 +227,7 @@ def test_a_projective_map_is_the_least_squares_one() -> None:
 def test_leaving_one_out_is_what_refitting_finds() -> None:
     pixels = spread(14)
     coordinates = truth("tps", pixels) + np.random.default_rng(2).normal(0, 100.0, (14, 2))
-    missed = fit("tps", pixels, coordinates).left_out
+    missed = fit("tps", pixels, coordinates).leave_one_out
     assert missed is not None
     for index in range(14):
         others = np.arange(14) != index
@@ -237,9 +237,9 @@ def test_leaving_one_out_is_what_refitting_finds() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_too_few_points_are_refused(method: str) -> None:
-    pixels = spread(LEAST[method] - 1)
+    pixels = spread(MIN_POINTS[method] - 1)
     with pytest.raises(
-        PlacementError, match=rf"{LEAST[method] - 1} control points?, but {method} needs {LEAST[method]}"
+        PlacementError, match=rf"{MIN_POINTS[method] - 1} control points?, but {method} needs {MIN_POINTS[method]}"
     ):
         fit(method, pixels, truth("affine", pixels))
 
@@ -258,20 +258,20 @@ def test_points_on_one_line_are_refused(method: str) -> None:
 def test_points_that_leave_a_map_open_are_refused() -> None:
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     circle = SHEET / 2 + 3000 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    with pytest.raises(PlacementError, match="curve that a polynomial of degree 2 cannot see"):
+    with pytest.raises(PlacementError, match="curve that does not determine a polynomial of degree 2"):
         fit("poly2", circle, truth("poly2", circle))
     row = np.array([[0.0, 0], [1000, 0], [2000, 0], [500, 900]])
-    with pytest.raises(PlacementError, match="no three lie on one line"):
+    with pytest.raises(PlacementError, match="no three of them on one line"):
         fit("projective", row, truth("affine", row))
     same = np.full((5, 2), 7.0)
-    with pytest.raises(PlacementError, match="one and the same"):
+    with pytest.raises(PlacementError, match="all control points coincide"):
         fit("helmert", same, truth("affine", same))
 
 
 def test_a_spline_needs_pixels_apart_and_not_too_many() -> None:
     pixels = spread(9)
     pixels[4] = pixels[2]
-    with pytest.raises(PlacementError, match="control points 3 and 5 are the same pixel"):
+    with pytest.raises(PlacementError, match="control points 3 and 5 are one pixel at two places"):
         fit("tps", pixels, truth("tps", spread(9)))
     many = np.random.default_rng(0).uniform(0, SHEET, (2001, 2))
     with pytest.raises(PlacementError, match="2001 control points are too many"):

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from georef.errors import MOST_CHARACTERS, InputError, PlacementError, one_line
+from georef.errors import MAX_CHARACTERS, InputError, PlacementError, one_line
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import MAX_DEPTH, parse_json, read_json
 
@@ -41,32 +41,32 @@ def test_brackets_in_texts_are_not_counted(text: str) -> None:
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_are_a_document_or_a_value_error_in_one_line(data: bytes) -> None:
-    said = ""
+def test_any_bytes_are_a_document_or_a_one_line_error(data: bytes) -> None:
+    message = ""
     try:
         parse_json(data)
     except DamagedFile as error:
-        said = str(error)
-    assert "\n" not in said
+        message = str(error)
+    assert "\n" not in message
 
 
 @pytest.mark.parametrize(
     ("text", "finding"),
     [
-        ("[NaN]", "NaN is no number"),
-        ("-Infinity", "-Infinity is no number"),
-        ("[1e999]", "larger than any float64"),
+        ("[NaN]", "NaN is not a number"),
+        ("-Infinity", "-Infinity is not a number"),
+        ("[1e999]", "beyond the range of float64"),
         ("1" + "0" * 5000, "larger than 2\\^64"),
-        ('{"a": 1, "b": {"a": 1}, "a": 2}', "'a' twice"),
-        ('["\\ud800"]', "half of a surrogate pair"),
+        ('{"a": 1, "b": {"a": 1}, "a": 2}', "duplicate key 'a'"),
+        ('["\\ud800"]', "a lone surrogate"),
         ("[" * 100_000, "nested too deeply"),
         ('{"a":[' * 100_000, "nested too deeply"),
         ("", "not JSON: Expecting value at line 1, column 1"),
-        (b"\xff\xff\xff", "no UTF-8 text"),
-        (b"\xff\xfe\x00", "no UTF-16 text"),
+        (b"\xff\xff\xff", "not UTF-8 text"),
+        (b"\xff\xfe\x00", "not UTF-16 text"),
     ],
 )
-def test_what_is_ruled_out(text: str | bytes, finding: str) -> None:
+def test_invalid_documents(text: str | bytes, finding: str) -> None:
     with pytest.raises(DamagedFile, match=finding):
         parse_json(text)
 
@@ -76,18 +76,18 @@ def test_pairs_of_surrogates_are_characters() -> None:
     assert math.copysign(1, parse_json("-0.0")) == -1
 
 
-def test_files_that_are_none(tmp_path: Path) -> None:
+def test_invalid_files(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "zero").symlink_to("/dev/zero")
     (tmp_path / "round").symlink_to(tmp_path / "round")
     (tmp_path / "large").write_bytes(b" " * 101)
     for name, finding in {
-        "pipe": "no plain file",
-        "zero": "no plain file",
+        "pipe": "not a regular file",
+        "zero": "not a regular file",
         "": "a folder",
         "gone": "No such file",
         "round": "levels",
-        "large": "more than the 0 MB",
+        "large": "more than the limit of 0 MB",
     }.items():
         with pytest.raises(PlacementError, match=finding) as caught:
             read_json(tmp_path / name, "give another", PlacementError, max_bytes=100)
@@ -95,13 +95,13 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 
 
 @given(st.text(max_size=3000))
-def test_messages_are_one_line_that_a_terminal_only_shows(text: str) -> None:
+def test_messages_are_one_printable_line(text: str) -> None:
     shown = str(InputError(text, text, text))
     assert shown.isprintable()
-    assert len(shown) <= 3 * (MOST_CHARACTERS + 3)
-    shown.encode()  # half surrogates, as names of files that are no Unicode have, are gone
+    assert len(shown) <= 3 * (MAX_CHARACTERS + 3)
+    shown.encode()  # lone surrogates, as in file names that are not Unicode, are gone
 
 
-def test_paths_and_plain_texts_stay_as_they_are() -> None:
+def test_paths_and_plain_texts_are_unchanged() -> None:
     assert one_line("C:\\a  b\\ä.png: 3×4 px") == "C:\\a  b\\ä.png: 3×4 px"
     assert one_line("a\n\tb\x1b[2J") == "a b\ufffd[2J"

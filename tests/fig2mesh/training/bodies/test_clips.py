@@ -15,7 +15,7 @@ from fig2mesh.errors import FigureError
 from fig2mesh.training.bodies import clips as clips_module
 from fig2mesh.training.bodies.bullet_clips import read_motion
 from fig2mesh.training.bodies.bvh import read_bvh
-from fig2mesh.training.bodies.clips import Clip, canonical_joints, collect_poses, farthest, held_out, read_clips
+from fig2mesh.training.bodies.clips import Clip, canonical_joints, collect_poses, farthest_points, held_out, read_clips
 from fig2mesh.training.bodies.gltf_scene import read_scene
 from fig2mesh.training.bodies.retarget import (
     LIMB_END,
@@ -23,14 +23,14 @@ from fig2mesh.training.bodies.retarget import (
     about,
     angle_between,
     face_front,
-    look_ahead,
+    limit_head_turn,
+    limit_twist,
     mirrored,
+    normalise_poses,
     plausible,
     retarget,
-    settle,
     swings,
     twists,
-    unwring,
 )
 from fig2mesh.training.bodies.rig import KEY, KEY_PARENT, KEYS, T_POSE
 from fig2mesh.training.bodies.stances import stances
@@ -122,7 +122,7 @@ def assets(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def poses() -> np.ndarray:
-    return settle(stances(120, np.random.default_rng(5))[1])
+    return normalise_poses(stances(120, np.random.default_rng(5))[1])
 
 
 def test_bvh_rest_frames_and_end_sites(tmp_path: Path) -> None:
@@ -236,7 +236,7 @@ def test_mirror(poses: np.ndarray) -> None:
 def test_settled_poses_face_look_and_do_not_wring() -> None:
     rng = np.random.default_rng(2)
     wild = about(rng.normal(size=(200, 20, 3)), rng.uniform(0, 1.2, (200, 20)))
-    calm = settle(wild)
+    calm = normalise_poses(wild)
     joints = canonical_joints(calm)
     shoulders = joints[:, KEY["l_clavicle"]] - joints[:, KEY["r_clavicle"]]
     left = calm[:, KEY["hips"], :, 0] + shoulders / np.linalg.norm(shoulders, axis=1, keepdims=True)
@@ -248,7 +248,7 @@ def test_settled_poses_face_look_and_do_not_wring() -> None:
         parent = calm[:, KEY[above if above == "hips" else "l_" + above]]
         assert np.abs(twists(np.swapaxes(parent, -1, -2) @ calm[:, key], T_POSE[key])).max() < np.radians(most + 0.01)
     limbs = [KEY[name] for name in LIMB_END]
-    before, after = face_front(wild), unwring(look_ahead(face_front(wild)))
+    before, after = face_front(wild), limit_twist(limit_head_turn(face_front(wild)))
     assert np.allclose(
         np.einsum("nkij,kj->nki", before[:, limbs], T_POSE[limbs]),
         np.einsum("nkij,kj->nki", after[:, limbs], T_POSE[limbs]),
@@ -293,14 +293,14 @@ def test_plausible_rejects_hands_in_the_trunk_and_lying_figures() -> None:
 
 def test_farthest_spreads() -> None:
     points = np.concatenate([np.zeros((50, 2)), [[9, 0], [0, 9], [-9, 0], [0, -9]]])
-    assert set(farthest(points, 5)[1:]) == {50, 51, 52, 53}
-    assert len(set(farthest(np.random.default_rng(0).normal(size=(20, 3)), 99))) == 20
-    assert farthest(np.empty((0, 3)), 5).shape == (0,)
+    assert set(farthest_points(points, 5)[1:]) == {50, 51, 52, 53}
+    assert len(set(farthest_points(np.random.default_rng(0).normal(size=(20, 3)), 99))) == 20
+    assert farthest_points(np.empty((0, 3)), 5).shape == (0,)
 
 
 def test_shaken_knees_do_not_bend_backwards() -> None:
     stand = np.tile(np.eye(3), (200, len(KEYS), 1, 1))
-    shaken = clips_module._shake(stand, np.random.default_rng(0))
+    shaken = clips_module._perturbed(stand, np.random.default_rng(0))
     for key, forward in (("l_lower_leg", -1), ("r_lower_leg", -1), ("l_lower_arm", 1), ("r_lower_arm", 1)):
         parent = shaken[:, KEY[KEY_PARENT[key]]]
         local = np.swapaxes(parent, -1, -2) @ shaken[:, KEY[key]] @ T_POSE[KEY[key]]
@@ -343,7 +343,7 @@ def test_collect_from_files(assets: Path) -> None:
 
 def test_mixed_poses_join_two_clips() -> None:
     rng = np.random.default_rng(1)
-    made = settle(stances(60, rng)[1])
+    made = normalise_poses(stances(60, rng)[1])
     sources = [Clip("s/a", made[:30]), Clip("s/b", made[30:])]
     names, rotations = clips_module._mixed(sources, 200, rng)
     assert plausible(rotations).all()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from fig2mesh.skeleton import JOINT, JOINT_MIRROR, PART
-from fig2mesh.training.drawing.crop import ALLOWED, Crop, cut, seen_joints
-from fig2mesh.training.drawing.doodles import MANNERS, doodle, stance
+from fig2mesh.training.drawing.crop import ALLOWED, Crop, cut, visible_joints
+from fig2mesh.training.drawing.doodles import STYLES, doodle, stance
 from fig2mesh.training.drawing.draw import Layers
 from fig2mesh.training.drawing.thing_shapes import Thing
 from fig2mesh.training.drawing.worn import put_on
 from fig2mesh.training.samples.crop_data import Crops
-from fig2mesh.training.samples.crop_views import OTHER_SIDE, Viewer
+from fig2mesh.training.samples.crop_views import OTHER_SIDE, CropViewer
 
 
 def some(count: int, seed: int = 0) -> list[Crop]:
@@ -53,7 +53,7 @@ def test_figures_fill_their_crops(crops: list[Crop]) -> None:
 
 
 def test_there_are_all_manners() -> None:
-    assert sum(MANNERS.values()) == pytest.approx(1)
+    assert sum(STYLES.values()) == pytest.approx(1)
 
 
 def test_a_cut_keeps_places() -> None:
@@ -70,7 +70,7 @@ def test_a_cut_keeps_places() -> None:
 
 def test_hidden_joints_are_not_seen() -> None:
     labels = np.full((40, 40), PART["torso"], np.uint8)
-    seen = seen_joints(labels, np.full((21, 2), 20.0))
+    seen = visible_joints(labels, np.full((21, 2), 20.0))
     assert seen[JOINT["thorax"]]
     assert not seen[JOINT["l_wrist"]]
 
@@ -93,11 +93,11 @@ def test_things_go_before_or_behind_the_body(front: bool) -> None:
 
 
 @pytest.fixture(scope="module")
-def viewer(crops: list[Crop]) -> Viewer:
-    return Viewer(Crops(*(np.stack(values) for values in zip(*crops, strict=True))), grounds=2, size=128)
+def viewer(crops: list[Crop]) -> CropViewer:
+    return CropViewer(Crops(*(np.stack(values) for values in zip(*crops, strict=True))), backgrounds=2, size=128)
 
 
-def test_views_follow_their_figures(viewer: Viewer) -> None:
+def test_views_follow_their_figures(viewer: CropViewer) -> None:
     rng = np.random.default_rng(0)
     hits = []
     for row in range(20):
@@ -111,7 +111,7 @@ def test_views_follow_their_figures(viewer: Viewer) -> None:
     assert np.mean(hits) > 0.97  # some lie on the edge of thin limbs
 
 
-def test_views_follow_the_generator(viewer: Viewer) -> None:
+def test_views_follow_the_generator(viewer: CropViewer) -> None:
     first, second = (viewer.view(3, np.random.default_rng(5)) for _ in range(2))
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
 

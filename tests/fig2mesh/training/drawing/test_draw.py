@@ -13,12 +13,12 @@ from fig2mesh.training.drawing.draw import Layers, contours, draw, ink
 from fig2mesh.training.drawing.faces import Face
 from fig2mesh.training.drawing.marks import blur, distance, noise, stroke, warp, write
 from fig2mesh.training.drawing.styles import FILLS, PALETTES, PATTERNS, Pattern, palette, pattern_coverage, random_style
-from tests.fig2mesh.training.demo_body import MATERIALS, body, look
+from tests.fig2mesh.training.demo_body import MATERIALS, body, render_view
 
 
 @pytest.fixture(scope="module")
 def seen() -> tuple[Layers, Face]:
-    layers, face = look(body(np.random.default_rng(3)))
+    layers, face = render_view(body(np.random.default_rng(3)))
     assert face is not None
     return layers, face
 
@@ -159,7 +159,7 @@ def test_backgrounds_are_opaque_and_deterministic(kind: str) -> None:
 
 
 def test_every_fill_shrinks_to_a_picture(seen: tuple[Layers, Face]) -> None:
-    layers, face = look(body(np.random.default_rng(3)), "left", 128)
+    layers, face = render_view(body(np.random.default_rng(3)), "left", 128)
     for fill in FILLS:
         picture = draw(
             layers, MATERIALS, np.random.default_rng(2), style=style_with(fill=fill, glaze=True), face=face, shrink=2

@@ -12,15 +12,15 @@ from fig2mesh.nets.head_hsv import HeadHsv, HeadShape
 from fig2mesh.nets.texture_fill import FillShape, TextureFill
 from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
-from fig2mesh.texture.unseen import TextureNets
-from fig2mesh.training.evaluate.textures import COORDINATES, PLACED, ROADS, STRAIGHT, compare, face_share, painted
+from fig2mesh.texture.unobserved import TextureNets
+from fig2mesh.training.evaluate.textures import COORDINATES, METHODS, PLACED, STRAIGHT, compare, face_share, painted
 from fig2mesh.training.networks.loop import seeded
-from fig2mesh.training.samples.textured_subject import Subject, subjects
+from fig2mesh.training.samples.textured_subject import TexturedSubject, subjects
 from tests.fig2mesh.training.ellipsoids import BACK, FRONT, write_shards
 
 
 @pytest.fixture(scope="module")
-def subject(tmp_path_factory: pytest.TempPathFactory) -> Subject:
+def subject(tmp_path_factory: pytest.TempPathFactory) -> TexturedSubject:
     folder = tmp_path_factory.mktemp("ellipsoids") / "data"
     write_shards(folder)
     return subjects(folder, "valid-clips", 1)[0]
@@ -36,7 +36,7 @@ def untrained() -> TextureNets:
     )
 
 
-def test_points_lie_on_the_ellipsoid(subject: Subject) -> None:
+def test_points_lie_on_the_ellipsoid(subject: TexturedSubject) -> None:
     """Found from pictures and depths alone, so to a pixel or two."""
     seen = subject.sides.labels > 0
     radii = np.abs(subject.sides.points[seen]).max(axis=0)
@@ -45,10 +45,10 @@ def test_points_lie_on_the_ellipsoid(subject: Subject) -> None:
     assert np.abs(np.sqrt(away) - 1).mean() < 0.04
 
 
-@pytest.mark.parametrize("road", ROADS)
-def test_every_way_paints_every_side(subject: Subject, untrained: TextureNets, road: str) -> None:
+@pytest.mark.parametrize("method", METHODS)
+def test_every_way_paints_every_side(subject: TexturedSubject, untrained: TextureNets, method: str) -> None:
     pytest.importorskip("cv2")
-    made, _place = painted(subject, road, untrained)
+    made, _place = painted(subject, method, untrained)
     seen = subject.sides.labels > 0
     assert made.shape == subject.truth.shape
     assert np.isfinite(made[seen]).all()
@@ -56,16 +56,18 @@ def test_every_way_paints_every_side(subject: Subject, untrained: TextureNets, r
     assert np.abs(made[2][seen[2]] - FRONT).mean() < 25
 
 
-def test_straight_through_is_the_mirrored_front(subject: Subject, untrained: TextureNets) -> None:
+def test_straight_through_is_the_mirrored_front(subject: TexturedSubject, untrained: TextureNets) -> None:
     made, place = painted(subject, STRAIGHT, untrained)
     same, found = painted(subject, COORDINATES, untrained)
     np.testing.assert_array_equal(made, same)
     np.testing.assert_array_equal(place, found)
 
 
-@pytest.mark.parametrize("road", PLACED)
-def test_colours_are_from_where_they_are_said_to_be(subject: Subject, untrained: TextureNets, road: str) -> None:
-    made, place = painted(subject, road, untrained)
+@pytest.mark.parametrize("method", PLACED)
+def test_colours_are_from_where_they_are_said_to_be(
+    subject: TexturedSubject, untrained: TextureNets, method: str
+) -> None:
+    made, place = painted(subject, method, untrained)
     seen = subject.sides.labels > 0
     size = subject.front.shape[0]
     pixel = np.clip(((place[seen] + 1) / 2 * size).astype(int), 0, size - 1)
@@ -97,7 +99,7 @@ def test_what_lies_outside_of_the_body_does_not_count() -> None:
     assert compare(other, truth, mask)[0] == 90.0
 
 
-def test_a_mirrored_front_has_the_face_behind(subject: Subject, untrained: TextureNets) -> None:
+def test_a_mirrored_front_has_the_face_behind(subject: TexturedSubject, untrained: TextureNets) -> None:
     place = subject.sides.places()
     assert subject.face.any()
     head = subject.sides.labels[0] == 2
@@ -111,7 +113,7 @@ def test_a_mirrored_front_has_the_face_behind(subject: Subject, untrained: Textu
     assert np.isnan(face_share(made, place, replace(subject, face=np.zeros_like(subject.face)))).all()
 
 
-def test_truth_has_another_colour_behind(subject: Subject) -> None:
+def test_truth_has_another_colour_behind(subject: TexturedSubject) -> None:
     assert np.abs(subject.truth[2][subject.sides.labels[2] > 0] - BACK).mean() < 5
 
 

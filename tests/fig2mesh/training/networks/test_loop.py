@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 
 from fig2mesh.errors import InputError
-from fig2mesh.training.networks.loop import Regime, Result, Task, run_loop, seeded
+from fig2mesh.training.networks.loop import Regime, Result, TrainingTask, run_loop, seeded
 from fig2mesh.training.networks.schedule import Schedule
 
 
@@ -44,7 +44,7 @@ def train(folder: Path, stop_at: int | None = None, **changed: Any) -> tuple[nn.
     clock = {name: changed.pop(name) for name in ("clock",) if name in changed}
     regime = Regime(warmup=5, validations=changed.pop("validations", 2), checkpoint_s=0.0)
     optimizer = torch.optim.Adam(model.parameters(), 1e-2)
-    task = Task(model, optimizer, step, validate, batch=32, arguments=changed.pop("arguments", {}))
+    task = TrainingTask(model, optimizer, step, validate, batch=32, arguments=changed.pop("arguments", {}))
     schedule = Schedule(**{"steps": 60, "seed": 7, "batch": 32, **changed})
     return model, run_loop(task, folder, schedule, regime, **clock)
 

@@ -1,4 +1,4 @@
-"""What the texture networks learn from and what they learn, on ellipsoids whose surface is known."""
+"""Inputs and results of training the texture networks, on ellipsoids whose surface is known."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_texture_space_knows_front_and_back_apart() -> None:
         there = bodies.there & columns
         assert there.any()
         assert np.abs(bodies.truth[there].astype(int) - colour).max() < 8
-    assert not bodies.seen[..., from_front > 0.3].any()
+    assert not bodies.observed[..., from_front > 0.3].any()
     assert bodies.same[bodies.there].mean() > 0.9
     assert set(np.unique(bodies.part)) == {0, *(PART[name] for names in QUARTERS for name in names)}
 
@@ -71,17 +71,18 @@ def test_bodies_without_texture_coordinates_are_left_out(tmp_path: Path) -> None
     made.uv[1] = 0
     np.savez(tmp_path / "train-00000.npz", picture=made.picture, labels=made.labels, depth=made.depth, uv=made.uv)
     assert len(load_drawings(tmp_path, ("train",), pictures=False)) == 2
-    assert len(load_drawings(tmp_path, ("train",), pictures=True, most=1)) == 1
+    assert len(load_drawings(tmp_path, ("train",), pictures=True, limit=1)) == 1
 
 
 def test_data_without_pictures_is_one_line(tmp_path: Path) -> None:
     np.savez(tmp_path / "train-00000.npz", joints=np.zeros(3))
-    with pytest.raises(FigureError, match="no readable shard"):
+    with pytest.raises(FigureError, match="not a readable shard"):
         load_drawings(tmp_path, ("train",), pictures=True)
 
 
+@pytest.mark.slow
 def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: Path, tmp_path: Path) -> None:
-    """From depth alone an ellipsoid looks the same from two sides; its parts tell them apart."""
+    """From depth alone an ellipsoid looks the same from two sides; its parts distinguish them."""
     errors = {}
     for masks in (True, False):
         shape = UvUnetShape(masks, filters=8)
@@ -95,6 +96,7 @@ def test_texture_coordinates_are_learned_from_parts_and_less_well_without(data: 
     assert errors[True] < 0.7 * errors[False]
 
 
+@pytest.mark.slow
 def test_networks_of_unseen_sides_learn_one_after_the_other(data: Path, tmp_path: Path) -> None:
     """Coordinates cannot find the colour of the back in the front; the refining networks can learn it."""
     found = train_fill(data, tmp_path, Schedule(steps=20))

@@ -15,7 +15,7 @@ from fig2mesh.training.drawing.doodles import doodle, stance
 from fig2mesh.training.networks.schedule import Schedule
 from fig2mesh.training.networks.train_parse import collate, heat_targets, losses, peaks, sides_right, train_parse
 from fig2mesh.training.samples.crop_data import FIELDS, RECIPE, load_crops
-from fig2mesh.training.samples.crop_views import View
+from fig2mesh.training.samples.crop_views import CropView
 
 
 def test_targets_are_bells_round_the_joints() -> None:
@@ -38,7 +38,7 @@ def target() -> dict[str, torch.Tensor]:
     rng = np.random.default_rng(0)
     labels = rng.integers(0, LABELS, (2 * MASK, 2 * MASK)).astype(np.uint8)
     seen = np.arange(21) % 3 > 0
-    view = View(np.zeros((2 * MASK,) * 2 + (3,), np.uint8), labels, rng.random((21, 2), np.float32), seen, seen)
+    view = CropView(np.zeros((2 * MASK,) * 2 + (3,), np.uint8), labels, rng.random((21, 2), np.float32), seen, seen)
     return collate([view, view])
 
 

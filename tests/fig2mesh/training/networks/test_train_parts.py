@@ -90,6 +90,7 @@ def test_a_batch_is_half_inside(data):
 
 
 @pytest.mark.parametrize("variant", ["one-stream", "two-stream-pose"])
+@pytest.mark.slow
 def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
     shape = DisnShape.of("hand", variant)
     scores = [
@@ -105,6 +106,7 @@ def test_training_is_deterministic_and_leaves_weights(data, tmp_path, variant):
     assert (tmp_path / "a" / "log.csv").read_text().startswith("step,")
 
 
+@pytest.mark.slow
 def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
     shape = DisnShape("foot")
     train_parts(data, "foot", shape, tmp_path / "whole", Schedule(batch=4), FEW, epochs=1)
@@ -138,6 +140,7 @@ def test_going_on_equals_an_undisturbed_run(data, tmp_path, monkeypatch):
     assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_network_learns_capsules_of_bodies_that_it_has_not_seen(tmp_path):
     write_shard(tmp_path / "train-00000.npz", 12, 0)
     write_shard(tmp_path / "valid-clips-00000.npz", 1, 2, grids=True)

@@ -14,7 +14,7 @@ from fig2mesh.training.bodies import subject as subject_module
 from fig2mesh.training.bodies.pack import save_pack
 from fig2mesh.training.samples import build as build_module
 from fig2mesh.training.samples import sample as samples
-from fig2mesh.training.samples.build import Wanted, build, shards
+from fig2mesh.training.samples.build import BuildOptions, build, shards
 from tests.fig2mesh.training.figures import capsule_pack
 
 NODES = 8
@@ -42,7 +42,7 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def made(pack: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("made") / "data"
-    build(pack, out, Wanted(bodies=3, valid=1, pictures=False))
+    build(pack, out, BuildOptions(bodies=3, valid=1, pictures=False))
     return out
 
 
@@ -75,7 +75,10 @@ def test_what_is_missing_or_corrupt_is_made_again_with_the_same_bytes(pack: Path
         path.write_bytes(damage.encode())
     counts: list[tuple[int, int]] = []
     build(
-        pack, made, Wanted(bodies=3, valid=1, pictures=False), report=lambda done, total: counts.append((done, total))
+        pack,
+        made,
+        BuildOptions(bodies=3, valid=1, pictures=False),
+        report=lambda done, total: counts.append((done, total)),
     )
     assert path.read_bytes() == before
     assert counts == [(0, 1), (1, 1)]
@@ -86,7 +89,7 @@ def test_what_is_missing_or_corrupt_is_made_again_with_the_same_bytes(pack: Path
 def test_another_recipe_is_refused_in_one_line(pack: Path, made: Path, change: dict[str, int]) -> None:
     before = {path.name: path.read_bytes() for path in made.iterdir()}
     with pytest.raises(FigureError, match="another recipe") as caught:
-        build(pack, made, Wanted(**{"bodies": 3, "valid": 1, "pictures": False, **change}))  # type: ignore[arg-type]
+        build(pack, made, BuildOptions(**{"bodies": 3, "valid": 1, "pictures": False, **change}))  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
     assert {path.name: path.read_bytes() for path in made.iterdir()} == before
 
@@ -98,7 +101,7 @@ def test_a_missing_pack_leaves_no_folder(tmp_path: Path) -> None:
 
 
 def test_pictures_have_the_documented_shapes_and_show_the_parts(pack: Path, tmp_path: Path) -> None:
-    build(pack, tmp_path, Wanted(bodies=1, valid=0, pictures=True))
+    build(pack, tmp_path, BuildOptions(bodies=1, valid=0, pictures=True))
     with np.load(tmp_path / "train-00000.npz") as archive:
         found = {name: (archive[name].shape, archive[name].dtype.name) for name in ("picture", "labels", "depth", "uv")}
         labels, depth = archive["labels"], archive["depth"]

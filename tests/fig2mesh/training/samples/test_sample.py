@@ -1,4 +1,4 @@
-"""What samples promise: distances, points, cubes, masks and joints of one subject agree with its mesh."""
+"""Properties of samples: distances, points, cubes, masks and joints of one subject agree with its mesh."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fig2mesh.training.samples.sdf import signed_distance, signed_distance_torch
 from tests.fig2mesh.training.figures import capsule_pack
 
 NODES = 32
-"""Of the dense grids here; real ones have twice as many, and take eight times as long."""
+"""Edge of the dense grids here; real ones have twice as many, and take eight times as long."""
 
 PIXEL = (np.arange(MASK) + 0.5) / MASK * 2 - 1
 
@@ -50,7 +50,7 @@ def coarse_grids() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def sample(coarse_grids: None) -> Sample:
-    """Of the first subject who wears a skirt."""
+    """Seed of the first subject who wears a skirt."""
     subject = next(s for s in (draw_subject(capsule_pack(), "train", k) for k in range(60)) if len(s.skirt_faces))
     return _sample(subject)
 
@@ -135,7 +135,7 @@ def test_joints_lie_in_their_parts(sample: Sample) -> None:
 
 @pytest.mark.parametrize("view", [0, 1])
 def test_masks_are_the_silhouettes_of_the_fields(sample: Sample, cut: Sample, view: int) -> None:
-    """Of parts without overlap field and mask tell the same; the rings by which real ones overlap are not drawn."""
+    """Field and mask of parts without overlap agree; the rings by which real ones overlap are not drawn."""
     nodes = np.linspace(-1, 1, NODES)
     column, row, depth = np.meshgrid(PIXEL, -PIXEL, nodes)
     points = np.stack([column, row, depth], axis=-1) @ VIEWS[view]

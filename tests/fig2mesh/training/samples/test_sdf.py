@@ -20,7 +20,7 @@ from tests.fig2mesh.training.figures import capsule_man
 Solid = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 SAG = 0.006
-"""How far the triangles of `ball` lie below their sphere of radius 1."""
+"""Depth of the triangles of `ball` below their sphere of radius 1."""
 
 POINTS = arrays(np.float64, (20, 3), elements=st.floats(-1.5, 1.5, width=32))
 

@@ -1,10 +1,10 @@
-"""What Blender makes of a file: runs where `bpy` is, not where the project is.
+"""Import of a file into Blender; runs in the environment of `bpy`, not of the project.
 
 stdin:  {"file": path, "picture": path of a PNG or null, "size": [width, height]}
-stdout: after whatever Blender says, one line of JSON: the imported meshes, their materials, parts and properties
+stdout: after Blender's own output, one line of JSON: the imported meshes, their materials, parts and properties
 
-The picture is what a camera sees that stands in front of the figure, where Blender has its front view: at -y, looking
-along +y, z up; without perspective, the box of the meshes filling the height; by Cycles on the CPU, in even light.
+The picture is an orthographic front view as in Blender: from -y along +y, z up, with the bounding box of the meshes
+filling the height; rendered by Cycles on the CPU, in uniform light.
 https://docs.blender.org/manual/en/4.2/addons/import_export/scene_gltf2.html
 https://docs.blender.org/manual/en/4.2/files/import_export/usd.html
 """
@@ -65,9 +65,9 @@ def images(material: bpy.types.Material) -> list:
 
 
 def plain(item: bpy.types.ID) -> dict:
-    """Custom properties as JSON takes them."""
+    """Convert custom properties to JSON types."""
     found = {}
-    for key in item.keys():  # noqa: SIM118 - this is no dict
+    for key in item.keys():  # noqa: SIM118 - this is not a dict
         value = item[key]
         found[key] = (
             value.to_dict() if hasattr(value, "to_dict") else value.to_list() if hasattr(value, "to_list") else value
@@ -107,4 +107,4 @@ def render(path: Path, size: list, low: list, high: list) -> None:
 
 main()
 sys.stdout.flush()
-os._exit(0)  # bpy 4.2 may crash while Python tidies up
+os._exit(0)  # bpy 4.2 may crash at exit

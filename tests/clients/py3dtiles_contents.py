@@ -1,6 +1,6 @@
-"""What py3dtiles, a reader that shares no code with ours, finds in a tileset of many figures.
+"""Facts about a tileset of many figures by py3dtiles, an independent reader.
 
-python py3dtiles_read.py TILESET_JSON
+python py3dtiles_contents.py TILESET_JSON
 stdout: {version, tiles, contents: {uri: {kind, vertices, batch}}}; uri as its tile has it
 https://py3dtiles.org
 """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fig2mesh.texture.votes import voted
+from fig2mesh.texture.majority import recoloured_by_majority
 
 SHIRT, SKIN, COAT = 0, 1, 2
 
@@ -26,7 +26,7 @@ PLACES = np.array([[30, 20], [5, 20], [30, 5]])
 
 
 def result_of(kind: np.ndarray, pixels: np.ndarray, votes: np.ndarray) -> np.ndarray:
-    return voted(kind, pixels, PLACES[votes])
+    return recoloured_by_majority(kind, pixels, PLACES[votes])
 
 
 def test_an_area_goes_as_a_whole_where_most_votes_are_for_one_other_colour() -> None:
@@ -67,6 +67,6 @@ def test_few_votes_and_votes_beyond_the_picture_do_not_count() -> None:
     np.testing.assert_array_equal(result_of(kind, few, np.full(5, COAT)), kind)
     beyond = np.array([[-1, 20], [30, 40], [60, 0]] * 20)
     inside = np.array([[30, 20]] * 60)
-    np.testing.assert_array_equal(voted(kind, beyond, inside), kind)
-    np.testing.assert_array_equal(voted(kind, inside, beyond), kind)
-    np.testing.assert_array_equal(voted(kind, np.zeros((0, 2), int), np.zeros((0, 2), int)), kind)
+    np.testing.assert_array_equal(recoloured_by_majority(kind, beyond, inside), kind)
+    np.testing.assert_array_equal(recoloured_by_majority(kind, inside, beyond), kind)
+    np.testing.assert_array_equal(recoloured_by_majority(kind, np.zeros((0, 2), int), np.zeros((0, 2), int)), kind)

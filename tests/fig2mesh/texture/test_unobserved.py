@@ -1,4 +1,4 @@
-"""Four sides of a body, and what networks change of where unseen points find their colours."""
+"""Four sides of a body, and the networks' changes of the locations from which hidden points take their colours."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from fig2mesh.nets.uv_unet import UvUnet, UvUnetShape
 from fig2mesh.nets.view_refine import RefineShape, ViewRefine
 from fig2mesh.records import Pose3D
 from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART
-from fig2mesh.texture.sides import FILLED, Sides, body_labels, look_around
-from fig2mesh.texture.unseen import (
+from fig2mesh.texture.sides import FILLED, SideViews, body_labels, trace_sides
+from fig2mesh.texture.unobserved import (
     TextureNets,
     front_picture,
     paint,
+    place_changes,
     texture_coordinates,
-    unseen_changes,
-    unseen_sides,
+    unobserved_sides,
 )
 from fig2mesh.training.networks.loop import seeded
 
@@ -41,11 +41,11 @@ def body() -> Body:
 
 
 @pytest.fixture(scope="module")
-def sides(body: Body) -> Sides:
-    return look_around(body, POSE, SIZE)
+def sides(body: Body) -> SideViews:
+    return trace_sides(body, POSE, SIZE)
 
 
-def test_sides_show_the_surface(body: Body, sides: Sides) -> None:
+def test_sides_show_the_surface(body: Body, sides: SideViews) -> None:
     seen = sides.labels > 0
     assert np.abs(body.distance(sides.points[seen])).max() < 2e-3
     for view, yaw in enumerate(VIEW_YAW_DEG.values()):
@@ -54,7 +54,7 @@ def test_sides_show_the_surface(body: Body, sides: Sides) -> None:
     assert not np.isfinite(sides.depth[~seen]).any()
 
 
-def test_sides_are_framed_as_training_pictures_are(sides: Sides) -> None:
+def test_sides_are_framed_as_training_pictures_are(sides: SideViews) -> None:
     for view in sides.labels:
         rows, columns = (np.flatnonzero((view > 0).any(axis=axis)) for axis in (1, 0))
         longest = max(np.ptp(rows), np.ptp(columns)) + 1
@@ -62,7 +62,7 @@ def test_sides_are_framed_as_training_pictures_are(sides: Sides) -> None:
         assert (rows[0] + rows[-1] + 1) / 2 == pytest.approx(SIZE / 2, abs=1)
 
 
-def test_places_in_front_are_pixels(sides: Sides) -> None:
+def test_places_in_front_are_pixels(sides: SideViews) -> None:
     along = (np.arange(SIZE) + 0.5) / SIZE * 2 - 1
     seen = sides.labels[0] > 0
     x, y = np.meshgrid(along, along)
@@ -82,12 +82,12 @@ def test_extras_count_as_what_they_cover() -> None:
     wanted = [PART[n] for n in ("torso", "l_upper_leg", "r_upper_leg", "l_lower_leg", "r_lower_leg")]
     assert body_labels(labels, points, Pose3D(joints)).tolist() == wanted
     turned = Pose3D(joints * np.array([-1, 1, 1], np.float32))
-    assert body_labels(labels, points, turned)[1] == PART["r_upper_leg"], "seen from behind"
+    assert body_labels(labels, points, turned)[1] == PART["r_upper_leg"], "from behind"
     others = np.array([PART["hair"], PART["prop"], 0, PART["l_hand"]], np.uint8)
     assert body_labels(others, points[:4], POSE).tolist() == [PART["head"], 0, 0, PART["l_hand"]]
 
 
-def test_the_front_picture_is_the_drawing_in_the_frame_of_the_sides(sides: Sides) -> None:
+def test_the_front_picture_is_the_drawing_in_the_frame_of_the_sides(sides: SideViews) -> None:
     frame = ImageFrame((50.0, 60.0), 0.01)
     columns = np.arange(100, dtype=np.float32) + 0.5
     picture = np.broadcast_to(columns[None, :, None], (120, 100, 3)).copy()
@@ -103,16 +103,16 @@ def networks() -> TextureNets:
     return TextureNets(uv, seeded(0, lambda: TextureFill(FillShape(32, 4))).eval(), refine.eval(), head.eval())
 
 
-def changed(sides: Sides, nets: TextureNets) -> np.ndarray:
+def changed(sides: SideViews, nets: TextureNets) -> np.ndarray:
     front = np.zeros((SIZE, SIZE, 3), np.float32)
-    return unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    return place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
 
 
-def test_untrained_networks_change_nothing(sides: Sides) -> None:
+def test_untrained_networks_change_nothing(sides: SideViews) -> None:
     assert not changed(sides, networks()).any()
 
 
-def test_a_change_in_texture_space_moves_every_place_by_as_much(sides: Sides) -> None:
+def test_a_change_in_texture_space_moves_every_place_by_as_much(sides: SideViews) -> None:
     nets = networks()
     with torch.no_grad():
         nets.fill.net.give[0].bias[:4] = 0.1
@@ -122,7 +122,7 @@ def test_a_change_in_texture_space_moves_every_place_by_as_much(sides: Sides) ->
     assert not found[~seen].any()
 
 
-def test_untrained_networks_paint_the_front_straight_through(sides: Sides) -> None:
+def test_untrained_networks_paint_the_front_straight_through(sides: SideViews) -> None:
     rng = np.random.default_rng(0)
     front = rng.uniform(0, 255, (SIZE, SIZE, 3)).astype(np.float32)
     nets = networks()
@@ -138,7 +138,7 @@ def test_untrained_networks_paint_the_front_straight_through(sides: Sides) -> No
 def test_only_sides_that_the_drawing_does_not_show_are_told_of(body: Body) -> None:
     frame = ImageFrame((50.0, 60.0), 0.01)
     picture = np.full((120, 100, 3), 80.0, np.float32)
-    found = unseen_sides(body, POSE, picture, frame, replace(networks(), head=None))
+    found = unobserved_sides(body, POSE, picture, frame, replace(networks(), head=None))
     assert set(np.unique(found.labels)) == {PART["head"], PART["torso"]}
     assert len(found.labels) == len(found.points) == len(found.found) > 10_000
     np.testing.assert_allclose(found.found, found.points, atol=1e-6)

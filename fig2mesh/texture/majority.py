@@ -1,8 +1,8 @@
-"""What networks tell of unseen sides, area by area.
+"""Majority vote of networks on the colours of sides that are not observed, area by area.
 
-Networks are right about what a side shows, a back without a face or an open coat, and uneven about where it ends. So
-they do not paint: each area of one colour that a drawing has is kept on the unseen sides as it is, unless for most of
-what lies behind it they name places of one other colour, which then is the area's.
+Networks are right about the content of a side, a back without a face or an open coat, and inexact about its borders. So
+they do not paint: each area of one colour of the drawing stays as it is on the other sides, unless for most of the
+points behind it they choose locations of one other colour, which then becomes the area's.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 MAJORITY: Final = 0.5
-"""Share of votes that another colour needs."""
+"""Threshold of the share of votes for another colour."""
 
-LEAST_VOTES: Final = 12
-"""Fewer pixels of the sides tell nothing."""
+MIN_VOTES: Final = 12
+"""Least number of votes, pixels of the sides."""
 
 
 @dataclass(frozen=True)
-class Unseen:
-    """Points of the unseen sides, and where in the drawing networks look for their colours.
+class UnobservedPoints:
+    """Points of the sides that are not observed, and the locations of their colours in the drawing by the networks.
 
-    labels : (M,) uint8, part; points, found : (M, 2) float32, FIGURE x, y of the point itself and of that place
+    labels : (M,) uint8, part; points, found : (M, 2) float32, FIGURE x, y of the point itself and of that location
     """
 
     labels: NDArray[np.uint8]
@@ -33,14 +33,16 @@ class Unseen:
     found: NDArray[np.float32]
 
 
-def voted(kind: NDArray[np.int_], pixels: NDArray[np.intp], named: NDArray[np.intp]) -> NDArray[np.int_]:
-    """A picture of plain areas with those recoloured that the votes are for.
+def recoloured_by_majority(
+    kind: NDArray[np.int_], pixels: NDArray[np.intp], named: NDArray[np.intp]
+) -> NDArray[np.int_]:
+    """Recolour the areas of a plain picture by majority vote.
 
     Parameters
     ----------
     kind : (h, w) colour of each pixel
     pixels : (M, 2) row and column that each vote is for
-    named : (M, 2) row and column whose colour is voted for; where either is beyond the picture, it does not count
+    named : (M, 2) row and column of the colour voted for; votes with either pixel beyond the picture do not count
     """
     within = ((pixels >= 0) & (pixels < kind.shape) & (named >= 0) & (named < kind.shape)).all(axis=1)
     rows, votes = pixels[within], kind[named[within, 0], named[within, 1]]
@@ -53,7 +55,7 @@ def voted(kind: NDArray[np.int_], pixels: NDArray[np.intp], named: NDArray[np.in
         np.add.at(table, (area[here], votes[here]), 1.0)
         total, best = table.sum(axis=1), table.argmax(axis=1)
         most = table[np.arange(count + 1), best]
-        change = (total >= LEAST_VOTES) & (most > MAJORITY * total) & (best != colour)
+        change = (total >= MIN_VOTES) & (most > MAJORITY * total) & (best != colour)
         change[0] = False
         result = np.where(change[areas], best[areas], result)
     return np.asarray(result)

@@ -1,6 +1,6 @@
-"""What py3dtiles, a reader that shares no code with ours, finds in a tileset.
+"""Facts about a tileset by py3dtiles, an independent reader.
 
-python py3dtiles_look.py TILESET_JSON; stdout: [{geometric_error, uri, triangles, inside, feet}, ...], coarse to fine;
+python py3dtiles_levels.py TILESET_JSON; stdout: [{geometric_error, uri, triangles, inside, feet}, ...], coarse to fine;
 `inside`: all vertices lie in the tile's volume; `feet`: ECEF of the content's origin
 https://py3dtiles.org/
 """

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.cross_section import MAX_OFFSET, RATIO, column_extents, measure_cross_section
 from fig2mesh.parts.inflate import inflate
-from fig2mesh.parts.profile import OFFSET, RATIO, column_extents, measure_profile
 from fig2mesh.records import PartSdf
 
 PITCH = 0.005
@@ -67,11 +67,11 @@ def test_columns_of_an_ellipsoid_are_as_long_as_its_formula_says() -> None:
 
 @pytest.mark.parametrize("thickness", [0.7, 1.0, 1.5])
 def test_ratio_is_the_square_of_relative_thickness_and_offset_the_shift(thickness: float) -> None:
-    """What counts is how thick the network's part is, in units of how thick the drawn outline is inflated."""
+    """The thickness of the network's part counts in units of the inflated outline's thickness."""
     disc = canvas()
     bone = np.full(disc.sdf.shape, 0.02)
     field = ellipsoid((RADIUS, RADIUS, thickness * RADIUS), (0, 0, 0.06))
-    found = measure_profile(disc, torso(disc), [field], reference(disc), bone)
+    found = measure_cross_section(disc, torso(disc), [field], reference(disc), bone)
     assert found is not None
     assert found.ratio[middle_of(disc)] == pytest.approx(thickness**2, rel=0.1)
     assert found.offset[middle_of(disc)] == pytest.approx(0.04, abs=0.004)
@@ -79,42 +79,42 @@ def test_ratio_is_the_square_of_relative_thickness_and_offset_the_shift(thicknes
     drawn = reference(disc)
     np.testing.assert_array_equal(found.ratio * drawn > 0, drawn > 0)
     assert np.isfinite(found.offset).all()
-    assert (np.abs(found.offset) <= OFFSET).all()
+    assert (np.abs(found.offset) <= MAX_OFFSET).all()
 
 
 def test_absurd_parts_are_bounded() -> None:
     disc = canvas()
     absurd = ellipsoid((0.21, 0.21, 0.9), (0, 0, 0.5))
-    found = measure_profile(disc, torso(disc), [absurd], reference(disc), np.zeros(disc.sdf.shape))
+    found = measure_cross_section(disc, torso(disc), [absurd], reference(disc), np.zeros(disc.sdf.shape))
     assert found is not None
     assert found.ratio.max() == pytest.approx(RATIO[1])
-    assert found.offset[middle_of(disc)] == pytest.approx(OFFSET)
+    assert found.offset[middle_of(disc)] == pytest.approx(MAX_OFFSET)
 
 
 def test_where_nothing_is_known_nothing_is_said() -> None:
     disc = canvas()
     far = ellipsoid((0.1, 0.1, 0.1), (3.0, 0, 0))
     assert np.isnan(column_extents(disc, [far])[0]).all()
-    assert measure_profile(disc, torso(disc), [far], reference(disc), np.zeros(disc.sdf.shape)) is None
+    assert measure_cross_section(disc, torso(disc), [far], reference(disc), np.zeros(disc.sdf.shape)) is None
 
 
 def test_parts_that_do_not_explain_the_drawing_are_not_believed() -> None:
     """A network that makes a stick of what is drawn as a disc knows nothing of it (pictograms, blobs)."""
     disc = canvas()
     stick = ellipsoid((0.05, 0.2, 0.2), (0, 0, 0.08))
-    found = measure_profile(disc, torso(disc), [stick], reference(disc), np.zeros(disc.sdf.shape))
+    found = measure_cross_section(disc, torso(disc), [stick], reference(disc), np.zeros(disc.sdf.shape))
     assert found is not None
     np.testing.assert_allclose(found.ratio, 1.0)
     np.testing.assert_allclose(found.offset, 0.0)
 
 
 def test_a_head_has_one_ratio_and_one_offset() -> None:
-    """What an outline has of nose and hat is not repeated in depth, and a head is not sheared."""
+    """Nose and hat of an outline are not repeated in depth, and a head is not sheared."""
     disc = canvas()
     field = ellipsoid((RADIUS, RADIUS, 0.18), (0, 0, 0.03))
     head = replace(field, part=2, grid=field.grid + np.float32(0.02) * np.sin(40 * np.arange(NODES)).astype(np.float32))
     labels = np.where(disc.inside, np.uint8(2), np.uint8(0))
-    found = measure_profile(disc, labels, [head], reference(disc), np.zeros(disc.sdf.shape))
+    found = measure_cross_section(disc, labels, [head], reference(disc), np.zeros(disc.sdf.shape))
     assert found is not None
     assert np.ptp(found.ratio) < 1e-9
     assert np.ptp(found.offset) < 1e-9

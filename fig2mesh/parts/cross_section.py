@@ -1,8 +1,8 @@
 """Thickness and depth from part fields, outline from the drawing.
 
 A network's part is about as wide as drawn, seldom exactly: its own rim may not replace the drawn one. So the networks
-do not give the surface but its cross-section. Their parts are cut into columns along the line of sight; how thick the
-columns are, compared with an inflation of the same silhouette, is a smooth ratio, and how far their middle lies from
+do not give the surface but its cross-section. Their parts are cut into columns along the line of sight; the thickness
+of the columns relative to an inflation of the same silhouette is a smooth ratio, and the distance of their middle from
 the bone is a smooth offset. Both are applied to the inflation of the drawn outline, which keeps its round rim.
 """
 
@@ -20,31 +20,31 @@ from fig2mesh.records import PartSdf
 from fig2mesh.skeleton import PART
 
 DETAIL = 0.04
-"""Spread of the average over neighbouring columns of a part, FIGURE units: finer detail of a network is noise."""
+"""Standard deviation of the average over neighbouring columns, FIGURE units: finer detail of a network is noise."""
 
 SMOOTHNESS = 0.025
-"""Spread of the blend from one part to the next, FIGURE units."""
+"""Standard deviation of the blend from one part to the next, FIGURE units."""
 
 RATIO = (0.25, 2.5)
 """Bounds of the squared thickness relative to the inflation: half as thick to one and a half times."""
 
 HEAD_RATIO = (0.7, 1.3)
-"""The same of heads: those of drawings are round, whatever is on them."""
+"""The same bounds for heads: drawn heads are round, whatever is on them."""
 
-OFFSET = 0.12
+MAX_OFFSET = 0.12
 """Largest distance of the middle from the bone, FIGURE units."""
 
-DOUBT, BELIEF = 0.45, 0.7
-"""Overlap of a network's part with the drawn one, seen from the front: up to the former nothing of what it says of
-depth counts, from the latter on all of it."""
+LOW_OVERLAP, HIGH_OVERLAP = 0.45, 0.7
+"""Overlap of a network's part with the drawn one in the front view: up to the former its depth has no weight, from the
+latter on full weight."""
 
 
 @dataclass(frozen=True)
-class Profile:
-    """How a layer's cross-section differs from an inflated outline.
+class CrossSection:
+    """Difference of a layer's cross-section from an inflated outline.
 
     ratio : (H, W) factor of the squared half thickness
-    offset : (H, W) what is added to the depth of the middle, FIGURE units
+    offset : (H, W) added to the depth of the middle, FIGURE units
     """
 
     ratio: NDArray[np.float64]
@@ -52,7 +52,7 @@ class Profile:
 
 
 def column_extents(canvas: Canvas, fields: Sequence[PartSdf]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(H, W) FIGURE z of the foremost and the rearmost point of the union of some parts; NaN where they are not."""
+    """(H, W) FIGURE z of the foremost and the rearmost point of the union of some parts; NaN outside them."""
     shape = canvas.sdf.shape
     front, back = np.full(shape, np.nan), np.full(shape, np.nan)
     points = canvas.points()
@@ -72,7 +72,7 @@ def column_extents(canvas: Canvas, fields: Sequence[PartSdf]) -> tuple[NDArray[n
 
 
 def _columns(field: PartSdf) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """(n, n) nearest and farthest z of each column of a grid, between nodes, and whether there is anything in it."""
+    """(n, n) nearest and farthest z of each column of a grid, between nodes, and True where the column is not empty."""
     grid = field.grid.astype(np.float64)
     nodes = grid.shape[2]
     negative = grid < 0
@@ -97,14 +97,14 @@ def _window(where: NDArray[np.float64], nodes: int) -> tuple[slice, slice] | Non
     return np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
-def measure_profile(
+def measure_cross_section(
     canvas: Canvas,
     labels: NDArray[np.uint8],
     fields: Sequence[PartSdf],
     reference: NDArray[np.float64],
     bone: NDArray[np.float64],
-) -> Profile | None:
-    """The profile of a layer; None where the networks know none of its parts.
+) -> CrossSection | None:
+    """Cross-section of a layer; None where the networks have none of its parts.
 
     labels : (H, W) uint8, the parts of the drawn layer, 0 outside
     fields : of its parts
@@ -120,9 +120,9 @@ def measure_profile(
         common = there & drawn & (reference > 0)
         if not common.any():
             continue
-        # How well a network explains the drawing says how far it can be believed: a pictogram's head is no head.
+        # The overlap with the drawing is the confidence in a network: a pictogram's head is no head.
         overlap = common.sum() / max(int((there | drawn).sum()), 1)
-        trust = float(np.clip((overlap - DOUBT) / (BELIEF - DOUBT), 0.0, 1.0))
+        trust = float(np.clip((overlap - LOW_OVERLAP) / (HIGH_OVERLAP - LOW_OVERLAP), 0.0, 1.0))
         half = np.where(common, np.nan_to_num(front - back) / 2, 0.0)
         middle = np.where(common, np.nan_to_num(front + back) / 2 - bone, 0.0)
         # Sums before quotients: near a rim both are small, and neither alone means much. A head is a ball, and what
@@ -133,14 +133,14 @@ def measure_profile(
         )
         bounds = HEAD_RATIO if field.part == PART["head"] else RATIO
         ratio[drawn] = np.clip(squares / np.maximum(usual, 1e-12), *bounds)[drawn] ** trust
-        offset[drawn] = trust * np.clip(moments / np.maximum(weights, 1e-12), -OFFSET, OFFSET)[drawn]
+        offset[drawn] = trust * np.clip(moments / np.maximum(weights, 1e-12), -MAX_OFFSET, MAX_OFFSET)[drawn]
         known = True
     if not known:
         return None
     region = labels > 0
     blur = SMOOTHNESS / canvas.pitch
     _, nearest = ndimage.distance_transform_edt(~region, return_indices=True)
-    return Profile(*(ndimage.gaussian_filter(values[tuple(nearest)], blur) for values in (ratio, offset)))
+    return CrossSection(*(ndimage.gaussian_filter(values[tuple(nearest)], blur) for values in (ratio, offset)))
 
 
 def _averaged(values: NDArray[np.float64], blur: float) -> NDArray[np.float64]:

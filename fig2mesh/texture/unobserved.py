@@ -1,8 +1,8 @@
-"""Where in the drawing the sides that it does not show take their colours from (paper §4.3 and §4.4).
+"""Inference of the locations in the drawing from which the sides not drawn take their colours (paper §4.3 and §4.4).
 
-Four sides of the body are traced, their texture coordinates inferred, and in texture space a network tells for every
-texel how far from the place straight behind the drawing its colour is found. Two more add details to the sides painted
-so, one of them to heads.
+Four sides of the body are traced, their texture coordinates inferred, and in texture space a network infers for every
+texel the displacement of its colour from the location straight behind the drawing. Two more networks add details to the
+sides painted so, one of them to heads.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from fig2mesh.nets.uv_unet import UvUnet, infer_uv
 from fig2mesh.nets.view_refine import ViewRefine, refine
 from fig2mesh.records import Pose3D
 from fig2mesh.skeleton import PART
-from fig2mesh.texture.sides import Sides, look_around
+from fig2mesh.texture.majority import UnobservedPoints
+from fig2mesh.texture.sides import SideViews, trace_sides
 from fig2mesh.texture.space import inwards, shown_alike, spread, trust
-from fig2mesh.texture.votes import Unseen
 
 SMOOTH_PX: Final = 2.5
-"""Spread of the average over changes, pixels."""
+"""Standard deviation of the average over changes, pixels."""
 
-LEAST_PX: Final = 1.5
-"""Pixels nearer to the silhouette are seen at too much of a slant to tell anything."""
+MIN_INNER_PX: Final = 1.5
+"""Least distance of a pixel from the silhouette, pixels; nearer ones are visible at too much of a slant."""
 
 
-def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: Sides) -> NDArray[np.float32]:
-    """(H, W, 3) the drawing, colours 0-255, as the front of `sides` frames it."""
+def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: SideViews) -> NDArray[np.float32]:
+    """(H, W, 3) the drawing, colours 0-255, resampled to the front view of `sides`."""
     size = sides.labels.shape[1]
     along = (np.arange(size) + 0.5 - size / 2) * sides.pitch
     x, y = np.meshgrid(sides.centre[0] + along, sides.centre[1] - along)
@@ -51,7 +51,7 @@ def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: Sides)
 
 @dataclass(frozen=True)
 class TextureNets:
-    """The networks in the order in which they are asked; the main job does without the last two."""
+    """Texture networks in the order of their use; the main job uses the first two only."""
 
     uv: UvUnet
     fill: TextureFill
@@ -60,35 +60,35 @@ class TextureNets:
 
 
 def shipped() -> TextureNets:
-    """The networks that come with the package."""
+    """Read the networks that come with the package."""
     from fig2mesh.nets.texture_fill import FILL_WEIGHTS, FillShape
     from fig2mesh.nets.uv_unet import SHIPPED, UV_WEIGHTS
 
     return TextureNets(UV_WEIGHTS.shipped(SHIPPED), FILL_WEIGHTS.shipped(FillShape()))
 
 
-def texture_coordinates(sides: Sides, net: UvUnet) -> NDArray[np.float32]:
+def texture_coordinates(sides: SideViews, net: UvUnet) -> NDArray[np.float32]:
     """(4, H, W, 2) texture coordinates of the sides."""
     count("texture coordinate network")
     found = infer_uv(net, torch.from_numpy(sides.depth), torch.from_numpy(sides.labels))
     return np.asarray(found.movedim(1, 3).numpy())
 
 
-def unseen_changes(
-    sides: Sides, front: NDArray[np.float32], uv: NDArray[np.float32], net: TextureFill
+def place_changes(
+    sides: SideViews, front: NDArray[np.float32], uv: NDArray[np.float32], net: TextureFill
 ) -> NDArray[np.float32]:
-    """(4, H, W, 2) how far from straight behind the drawing the sides find their colours, edges at -1 and 1, y down.
+    """(4, H, W, 2) displacement of the sides' colours from straight behind the drawing, edges at -1 and 1, y down.
 
     front : as `front_picture` gives it; uv : (4, H, W, 2)
     """
-    seen = sides.labels > 0
+    visible = sides.labels > 0
     places = sides.places()
     same = shown_alike(sides.labels, places)
-    is_front = np.zeros(seen.shape, bool)
+    is_front = np.zeros(visible.shape, bool)
     is_front[0] = True
     values = np.concatenate([places, is_front[..., None], same[..., None]], axis=-1)
-    weight = trust(inwards(seen))
-    texels, total = spread(uv[seen], values[seen], weight[seen], net.shape.size)
+    weight = trust(inwards(visible))
+    texels, total = spread(uv[visible], values[visible], weight[visible], net.shape.size)
     there = torch.from_numpy(total > 0)[None]
     place = torch.from_numpy(texels[..., :2]).movedim(2, 0)[None]
     colour = sample(torch.from_numpy(np.clip(front / 255, 0, 1)).movedim(2, 0)[None], place)
@@ -98,27 +98,27 @@ def unseen_changes(
         change = net(fill_inputs(place, there, flags[..., 0] > 0, flags[..., 1] > 0.5, colour))
     at = torch.from_numpy(2 * uv - 1).movedim(3, 1)
     found = sample(change.expand(len(at), -1, -1, -1), at).movedim(1, 3).numpy()
-    return _smoothed(np.where(seen[..., None], found, np.float32(0)), seen)
+    return _smoothed(np.where(visible[..., None], found, np.float32(0)), visible)
 
 
-def _smoothed(change: NDArray[np.float32], seen: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Changes (4, H, W, 2) averaged over some pixels of the body: texture coordinates err from pixel to pixel."""
+def _smoothed(change: NDArray[np.float32], visible: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Average changes (4, H, W, 2) over some pixels of the body: texture coordinates err from pixel to pixel."""
     result = np.zeros_like(change)
     for side in range(len(change)):
-        share = ndimage.gaussian_filter(seen[side].astype(np.float32), SMOOTH_PX)
+        share = ndimage.gaussian_filter(visible[side].astype(np.float32), SMOOTH_PX)
         for axis in range(2):
             blurred = ndimage.gaussian_filter(change[side, ..., axis], SMOOTH_PX)
-            result[side, ..., axis] = np.where(seen[side], blurred / np.maximum(share, 1e-6), 0.0)
+            result[side, ..., axis] = np.where(visible[side], blurred / np.maximum(share, 1e-6), 0.0)
     return result
 
 
-def paint(sides: Sides, front: NDArray[np.float32], nets: TextureNets) -> NDArray[np.float32]:
+def paint(sides: SideViews, front: NDArray[np.float32], nets: TextureNets) -> NDArray[np.float32]:
     """(4, H, W, 3) pictures of the sides, 0-255; the front is the drawing where that shows it.
 
     front : as `front_picture` gives it
     """
     uv = texture_coordinates(sides, nets.uv)
-    place = torch.from_numpy(sides.places() + unseen_changes(sides, front, uv, nets.fill)).movedim(3, 1)
+    place = torch.from_numpy(sides.places() + place_changes(sides, front, uv, nets.fill)).movedim(3, 1)
     picture = torch.from_numpy(np.clip(front / 255, 0, 1)).movedim(2, 0)[None].expand(4, -1, -1, -1)
     painted = sample(picture, place)
     coordinates = torch.from_numpy(uv).movedim(3, 1)
@@ -132,18 +132,18 @@ def paint(sides: Sides, front: NDArray[np.float32], nets: TextureNets) -> NDArra
     return np.asarray(255 * painted.movedim(1, 3).numpy(), np.float32)
 
 
-def unseen_sides(
+def unobserved_sides(
     body: Body, pose: Pose3D, picture: NDArray[np.float32], frame: ImageFrame, nets: TextureNets
-) -> Unseen:
-    """The left, back and right of a body, and where networks look for their colours.
+) -> UnobservedPoints:
+    """Points of the left, back and right of a body, and the locations of their colours by the networks.
 
     picture : (H, W, 3) 0-255, the drawing with its colours continued beyond the silhouette
     """
-    sides = look_around(body, pose)
+    sides = trace_sides(body, pose)
     front = front_picture(picture, frame, sides)
-    change = unseen_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
-    used = inwards(sides.labels > 0) > LEAST_PX
+    change = place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
+    used = inwards(sides.labels > 0) > MIN_INNER_PX
     used[0] = False
     points = sides.points[used][:, :2]
     found = points + change[used] * np.array([sides.half, -sides.half], np.float32)
-    return Unseen(sides.shown[used], points, found.astype(np.float32))
+    return UnobservedPoints(sides.shown[used], points, found.astype(np.float32))
