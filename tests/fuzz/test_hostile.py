@@ -165,7 +165,7 @@ def test_rows_that_overlap_and_nodes_with_two_parents(tmp_path: Path) -> None:
         read_gltf(path).accessor(0)
     with pytest.raises(ExportError, match="two parents"):
         inspect(path)
-    with pytest.raises(ExportError, match="broken glTF"):
+    with pytest.raises(ExportError, match="invalid glTF"):
         read_model(path)
 
 

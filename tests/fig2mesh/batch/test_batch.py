@@ -146,7 +146,7 @@ def test_a_dry_run_reports_all_problems_and_writes_nothing(
     [
         (["nothing.csv", "-o", "out"], "nothing.csv"),
         (["people.csv"], "-o: no folder for the outputs; pass -o DIR"),
-        (["people.csv", "-o", "people.csv"], "people.csv: is no folder"),
+        (["people.csv", "-o", "people.csv"], "people.csv: not a directory"),
         (["people.csv", "-o", "out", "--engine", "dask"], "--engine dask: no scheduler is named"),
         (["people.csv", "-o", "out", "--address", "tcp://127.0.0.1:1"], "--address: given without --engine dask"),
         (["people.csv", "-o", "out", "--root", "nowhere"], "--root: no folder nowhere"),
@@ -175,7 +175,7 @@ def test_files_of_others_and_a_second_batch_are_refused(
 
     (tmp_path / "tileset.json").write_text("mine")
     assert main(["batch", str(collection), "-o", str(tmp_path)]) == 2
-    assert "exists, and is not of an earlier batch" in capsys.readouterr().err
+    assert "already exists, and is not from an earlier batch" in capsys.readouterr().err
     assert (tmp_path / "tileset.json").read_text() == "mine"
     (tmp_path / "tileset.json").unlink()
     (tmp_path / WORK).mkdir(exist_ok=True)

@@ -75,7 +75,10 @@ def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: A
         ({}, "column figure: is empty; name the picture of the figure"),
         ({"figure": "a", "lon": 8.0}, "column lat: is empty; give both lon and lat"),
         ({"figure": "a", "y": 8.0}, "column x: is empty; give both x and y"),
-        ({"figure": "a", "lon": 1, "lat": 2, "lonlat": "1 2"}, "column lonlat: beside lon and lat; give it once"),
+        (
+            {"figure": "a", "lon": 1, "lat": 2, "lonlat": "1 2"},
+            "column lonlat: cannot be combined with lon and lat; give one of them",
+        ),
         ({"figure": "a", "lonlat": "1"}, "column lonlat: 1 values; give 2: LON LAT"),
         (
             {"figure": "a", "quality": "superb"},
@@ -83,10 +86,10 @@ def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: A
         ),
         ({"figure": "a", "triangles": "many"}, "column triangles: 'many' is not a whole number"),
         ({"figure": "a", "seed": -1}, "column seed: -1 is out of range"),
-        ({"figure": "a", "evidence": "maybe"}, "column evidence: 'maybe'; give true or false"),
-        ({"figure": "a", "output": "b.glb"}, "column output: is chosen by the batch; remove the column"),
-        ({"figure": "a", "overwrite": True}, "column overwrite: is chosen by the batch"),
-        ({"figure": "a", "save_stages": "x"}, "column save_stages: is chosen by the batch"),
+        ({"figure": "a", "evidence": "maybe"}, "column evidence: 'maybe' is not a truth value; give true or false"),
+        ({"figure": "a", "output": "b.glb"}, "column output: is set by the batch; remove the column"),
+        ({"figure": "a", "overwrite": True}, "column overwrite: is set by the batch"),
+        ({"figure": "a", "save_stages": "x"}, "column save_stages: is set by the batch"),
     ],
 )
 def test_what_is_wrong_is_said_of_the_column(row: dict[str, Any], message: str) -> None:

@@ -178,10 +178,11 @@ def test_formats_come_and_go(batch: Batch, row: dict[str, Any]) -> None:
 def test_files_of_others_are_neither_replaced_nor_removed(folder: Path, row: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "person").mkdir()
     (tmp_path / "person" / "person.glb").write_text("mine")
-    for _ in range(2):  # the refusal itself must not make the folder ours
+    for _ in range(2):  # the refusal itself must not claim the folder
         outcome = convert_row(batch_of(folder, tmp_path), task_of(row))
         assert outcome.error == (
-            f"{tmp_path}/person: exists, and is not of an earlier batch; pass --overwrite or another -o DIR"
+            f"{tmp_path}/person: already exists, and is not from an earlier batch; "
+            "use --overwrite or choose another -o DIR"
         )
         assert (tmp_path / "person" / "person.glb").read_text() == "mine"
     (tmp_path / "person" / "notes.txt").write_text("mine")
@@ -216,13 +217,13 @@ BAD = {
     "choose from glb, gltf": {"format": "docx"},
     "ca. 1893": {"date": "ca. 1893"},
     "unknown value 'superb'": {"quality": "superb"},
-    "none beside light": {"effect": "none light"},
+    "none cannot be combined with light": {"effect": "none light"},
 }
 
 
 @pytest.fixture
 def bad(request: pytest.FixtureRequest, row: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    """A message, and a row that earns it."""
+    """A message, and a row that causes it."""
     changed = row | BAD[request.param]
     return request.param, {column: value for column, value in changed.items() if value is not None}
 

@@ -23,7 +23,7 @@ def test_rows_without_names_are_called_like_their_pictures() -> None:
 def test_a_name_given_twice_is_a_problem_of_the_second_row() -> None:
     first, second, third = tasks_of(_rows(*({"name": name, "figure": "a.png"} for name in ("Anna", "anna", "Bert"))))
     assert (first.problem, third.problem) == (None, None)
-    assert str(second.problem) == "line 3: its name anna is also that of row 1; give each row a name of its own"
+    assert str(second.problem) == "line 3: its name anna is also that of row 1; give each row a unique name"
     assert second.name != first.name
 
 

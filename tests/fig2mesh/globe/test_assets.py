@@ -96,18 +96,18 @@ def test_czml_brings_its_models_and_folders_their_files(tmp_path: Path, figure: 
 
 
 CASES = [
-    ("no.glb", None, "not there"),
-    ("picture.png", "x", "globe shows no"),
+    ("no.glb", None, "no such file"),
+    ("picture.png", "x", r"unknown suffix \.png"),
     ("cut.glb", "glTF", "not a valid glTF file"),
     ("tileset.json", "{", "not JSON"),
-    ("tileset.json", "[1]", "no tileset"),
+    ("tileset.json", "[1]", "not a tileset"),
     ("tileset.json", json.dumps(tileset_of("gone.glb")), "gone.glb"),
-    ("tileset.json", json.dumps(tileset_of("https://tiles.example/a.glb")), "elsewhere"),
+    ("tileset.json", json.dumps(tileset_of("https://tiles.example/a.glb")), "not a local file"),
     ("tileset.json", json.dumps(tileset_of(implicitTiling={})), "implicit"),
     ("tileset.json", json.dumps({"asset": {}, "root": {"children": [3]}}), "damaged"),
-    ("people.czml", '[{"id": "x"}]', "no CZML"),
+    ("people.czml", '[{"id": "x"}]', "not a CZML file"),
     ("people.czml", '[{"id": "document"}, {"model": {"gltf": "gone.glb"}}]', "gone.glb"),
-    ("places.geojson", '{"type": "Point"}', "no GeoJSON"),
+    ("places.geojson", '{"type": "Point"}', "not a GeoJSON file"),
 ]
 
 

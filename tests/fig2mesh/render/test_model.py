@@ -28,5 +28,5 @@ def test_labels_of_parts_come_back(tmp_path: Path, name: str | None) -> None:
 
 def test_compressed_models_are_refused_by_name(tmp_path: Path) -> None:
     write(asset(ZURICH), tmp_path / "a.glb", profile=PROFILES["cesiumjs"])
-    with pytest.raises(ExportError, match=r"a\.glb: is compressed \(EXT_meshopt_compression\); give the file written"):
+    with pytest.raises(ExportError, match=r"a\.glb: is compressed \(EXT_meshopt_compression\); give a file written"):
         read_model(tmp_path / "a.glb")

@@ -88,10 +88,10 @@ def test_sun_below_the_horizon_casts_no_shadow_rays(fields: FieldScene) -> None:
 @pytest.mark.parametrize(
     ("mode", "effects", "fields", "expected"),
     [
-        ("depth", "light", True, "falsify"),
-        ("normals", "ao", True, "falsify"),
-        ("clay", "light,sun", True, "two lamps"),
-        ("clay", "shadow", True, "nothing casts"),
+        ("depth", "light", True, "light cannot be combined with --mode depth"),
+        ("normals", "ao", True, "ao cannot be combined with --mode normals"),
+        ("clay", "light,sun", True, "light cannot be combined with sun"),
+        ("clay", "shadow", True, "shadow requires light or sun"),
         ("clay", "blend", True, "blend"),
         ("textured", "blend", False, "drawing instead"),
         ("clay", "smooth-union", False, "drawing instead"),

@@ -104,7 +104,7 @@ def body_value(part: PartSdf, points: np.ndarray) -> np.ndarray:
 
 def test_no_surface_is_an_error() -> None:
     empty = PartSdf(1, np.ones((8, 8, 8), np.float32), np.zeros(3, np.float32), 1.0)
-    with pytest.raises(ValueError, match="nothing to show"):
+    with pytest.raises(ValueError, match="no grid has a negative value"):
         field_atlas(Body((empty,)))
 
 

@@ -142,7 +142,7 @@ def test_heights_with_a_datum_are_converted_or_refused(path):
     [
         (0, "its layer has no reference system; assign one, or give columns lon and lat"),
         (-1, "its layer has no reference system; assign one, or give columns lon and lat"),
-        (77, "the reference system of its layer is not known; reproject it to WGS 84, or give columns lon and lat"),
+        (77, "unknown reference system of its layer; reproject it to WGS 84, or give columns lon and lat"),
     ],
 )
 def test_points_of_no_reference_system_are_no_places(path, code, finding):
@@ -159,7 +159,7 @@ def test_a_point_outside_of_its_reference_system_is_one_row(path):
     write_layer(path, {"figure": texts("a.png", "b.png")}, [wkb(1e30, 2e30), wkb(500000, 5000000)], "EPSG:32632")
     found = read(path)
     assert [row.problem for row in found] == [
-        "a point outside the area of WGS 84 / UTM zone 32N; check the reference system of its layer",
+        "point outside the area of WGS 84 / UTM zone 32N; check the reference system of its layer",
         None,
     ]
 
@@ -180,14 +180,14 @@ MULTI = b"\1\4\0\0\0"
         (MULTI + b"\1\0\0\0" + wkb(1, 2), None, (1, 2)),
         (MULTI + b"\0\0\0\0", None, None),
         (wkb(np.nan, np.nan), None, None),
-        (wkb(1, np.inf), "a point at 1.0 inf; give finite numbers", None),
+        (wkb(1, np.inf), "point at 1.0 inf; give finite numbers", None),
         (wkb(1, 2, np.nan), None, (1, 2)),
         (wkb(1, 2, 3), None, (1, 2, 3)),
         (b"\0\0\0\3\xe9" + np.array([1, 2, 3], ">f8").tobytes(), None, (1, 2, 3)),
         (b"\1\1\0\0\x80" + np.array([1, 2, 3], "<f8").tobytes(), None, (1, 2, 3)),
         (b"\1\xd1\x07\0\0" + np.array([1, 2, 9], "<f8").tobytes(), None, (1, 2)),
-        (b"\1\1\0\0\0", "a geometry that cannot be read; write the layer again", None),
-        (b"", "a geometry that cannot be read; write the layer again", None),
+        (b"\1\1\0\0\0", "invalid geometry; save the layer again", None),
+        (b"", "invalid geometry; save the layer again", None),
     ],
 )
 @pytest.mark.parametrize("envelope", [0, 1, 2, 4])
@@ -203,7 +203,7 @@ def test_shapes(path, shape, problem, place, envelope):
 def test_what_is_no_geometry_is_one_row(path):
     write_layer(path, {"figure": texts("a.png")}, [wkb(1, 2)])
     for value, problem in (
-        ("x'4750'", "a geometry that cannot be read; write the layer again"),
+        ("x'4750'", "invalid geometry; save the layer again"),
         ("'POINT'", None),
         ("7", None),
     ):
@@ -223,7 +223,7 @@ def test_the_layer_is_the_only_one_with_a_figure(path):
     for layer, message in (
         (None, 'several layers with a column figure: the "good" one; --, third; name one with --layer'),
         ("fourth", "no layer 'fourth' among places, the \"good\" one; --, third; name one of them"),
-        ("places", "no column figure among note; call the column with the pictures figure"),
+        ("places", "no column figure among note; name the column with the pictures figure"),
     ):
         with pytest.raises(InputError) as refused:
             read(path, layer)
@@ -257,7 +257,7 @@ def test_a_view_that_never_ends_is_given_up(path, monkeypatch):
         "SELECT figure FROM n WHERE figure < 0",
         "INSERT INTO gpkg_contents (table_name, identifier, data_type) VALUES ('endless', 'e', 'attributes')",
     )
-    with pytest.raises(InputError, match="a view takes too long; save the layer as a table"):
+    with pytest.raises(InputError, match="view takes too long; save the layer as a table"):
         read(path, "endless")
 
 
@@ -279,8 +279,8 @@ def test_values_that_are_too_much_are_one_row(path):
         "note: more than 65,536 characters; give a shorter text",
         "note: more than 65,536 characters; give a shorter text",
         "size: not a finite number; leave it empty",
-        "note: bytes that are no UTF-8; write the text again",
-        "note: a NUL character; remove it",
+        "note: bytes that are not UTF-8; save the text as UTF-8",
+        "note: NUL character; remove it",
     ]
 
 
@@ -309,7 +309,9 @@ def test_changes_that_are_not_written_back_are_not_missed(path):
         editor.commit()
         with pytest.raises(InputError) as refused:
             read(path)
-        finding = "changes in a.gpkg-wal that are not yet written to it; save and close it in the program that edits it"
+        finding = (
+            "has changes in a.gpkg-wal that are not yet written back; save and close it in the program that edits it"
+        )
         assert str(refused.value) == f"{path}: {finding}"
     assert len(read(path)) == 1
     journal = path.with_name("a.gpkg-journal")
@@ -334,15 +336,15 @@ def test_other_databases_and_damaged_files_are_refused_in_one_line(path):
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("CREATE TABLE figures (figure TEXT)")
     with pytest.raises(
-        InputError, match="an SQLite database, but no GeoPackage; give a file as QGIS or GDAL writes it"
+        InputError, match="an SQLite database, but not a GeoPackage; give a file written by QGIS or GDAL"
     ):
         read(path)
     path.unlink()
     write_layer(path, {"other": texts("a.png")}, None)
-    with pytest.raises(InputError, match="no layer with a column figure, of figures; call the column"):
+    with pytest.raises(InputError, match="no layer with a column figure, of figures; name the column"):
         read(path)
     change(path, "DELETE FROM gpkg_contents")
-    with pytest.raises(InputError, match="no layers; call the column"):
+    with pytest.raises(InputError, match="no layers; name the column"):
         read(path)
     path.unlink()
     write_layer(path, {"figure": texts(*["a.png"] * 5_000)}, [wkb(1, 2)] * 5_000)
@@ -357,5 +359,5 @@ def test_other_databases_and_damaged_files_are_refused_in_one_line(path):
 
 def test_columns_with_one_name_are_refused(path):
     write_layer(path, {"figure": texts("a.png"), "height-m": texts("1"), "height_m": texts("2")}, None)
-    with pytest.raises(InputError, match="two columns height_m; remove or rename one of them"):
+    with pytest.raises(InputError, match="two columns named height_m; remove or rename one of them"):
         read(path)

@@ -132,12 +132,12 @@ def test_one_bad_row_does_not_stop_the_others(folder, file):
     ("text", "finding"),
     [
         ("8,5", "lon: '8,5' has a comma; write a decimal point"),
-        ("8°30'", 'lon: "8°30\'" is no number; give a number with a decimal point'),
-        ("nan", "lon: 'nan' is no number; give a number with a decimal point"),
+        ("8°30'", 'lon: "8°30\'" is not a number; give a number with a decimal point'),
+        ("nan", "lon: 'nan' is not a number; give a number with a decimal point"),
         ("1e999", "lon: not a finite number; leave it empty"),
-        ("1_0", "lon: '1_0' is no number; give a number with a decimal point"),
-        ("٣", "lon: '٣' is no number; give a number with a decimal point"),
-        ("x\ny", "lon: 'x\\\\ny' is no number; give a number with a decimal point"),
+        ("1_0", "lon: '1_0' is not a number; give a number with a decimal point"),
+        ("٣", "lon: '٣' is not a number; give a number with a decimal point"),
+        ("x\ny", "lon: 'x\\\\ny' is not a number; give a number with a decimal point"),
     ],
 )
 @pytest.mark.parametrize("file", ["c.txt", "e.geojson"])
@@ -217,10 +217,10 @@ def check_outcome(path: Path) -> None:
     ("file", "data", "message"),
     [
         ("a.csv", b"", "empty; give a table with a column 'figure'"),
-        ("a.gpkg", b"figure\n", "not a GeoPackage; give a file as QGIS or GDAL writes it"),
-        ("a.xlsx", b"PK\3\4....", "a workbook or archive; save the table as CSV UTF-8"),
-        ("a.csv", b"PK\3\4....", "a workbook or archive; save the table as CSV UTF-8"),
-        ("a.shp", b"\0\0\x27\x0a", "suffix .shp; give a collection as CSV, GeoJSON or GeoPackage"),
+        ("a.gpkg", b"figure\n", "not a GeoPackage; give a file written by QGIS or GDAL"),
+        ("a.xlsx", b"PK\3\4....", "is a workbook or archive; save the table as CSV UTF-8"),
+        ("a.csv", b"PK\3\4....", "is a workbook or archive; save the table as CSV UTF-8"),
+        ("a.shp", b"\0\0\x27\x0a", "unknown suffix .shp; give a collection as CSV, GeoJSON or GeoPackage"),
     ],
 )
 def test_other_files_are_refused(tmp_path, file, data, message):
@@ -238,7 +238,7 @@ def test_missing_files_folders_and_layers_of_tables_are_refused(tmp_path):
         read(tmp_path)
     path = tmp_path / "a.csv"
     write_csv(path, [FARMER])
-    with pytest.raises(InputError, match="layer 'b' of a file without layers; leave it out"):
+    with pytest.raises(InputError, match="--layer 'b' requires a GeoPackage; leave it out"):
         read(path, layer="b")
 
 
