@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.training.drawing.marks import LETTERS, FloatImage, blur, lay, noise, stroke, write
+from fig2mesh.training.drawing.marks import LETTERS, FloatImage, blur, composite, noise, stroke, write
 
 # fmt: off
 BACKGROUNDS: Final = {"white": 0.22, "tint": 0.12, "paper": 0.26, "coast": 0.14, "realms": 0.1, "fields": 0.08,
@@ -40,8 +40,8 @@ def draw_background(kind: str, shape: tuple[int, int], rng: np.random.Generator)
     maps = {"coast": _coast, "realms": _realms, "fields": _fields, "town": _town}
     chart = maps[kind](np.full_like(paper, 255), rng)
     if rng.random() < 0.5:
-        chart = lay(chart, _one(rng, INKS), _graticule(shape, rng))
-    chart = lay(chart, _one(rng, INKS), _lettering(shape, rng))
+        chart = composite(chart, _pick(rng, INKS), _graticule(shape, rng))
+    chart = composite(chart, _pick(rng, INKS), _lettering(shape, rng))
     return blur(np.asarray(chart * paper / 255, np.float32), 0.35 * shape[0] / 256)
 
 
@@ -57,7 +57,7 @@ def _paper(shape: tuple[int, int], rng: np.random.Generator) -> FloatImage:
         for place in rng.uniform(0.2, 0.8, 2):
             stroke(fold, [[place * shape[1], 0], [place * shape[1] + rng.normal(0, 3), shape[0]]], 1.2 * scale)
         tone -= 0.1 * fold
-    return np.asarray(np.clip(np.array(_one(rng, PAPERS)) * tone[..., None], 0, 255), np.float32)
+    return np.asarray(np.clip(np.array(_pick(rng, PAPERS)) * tone[..., None], 0, 255), np.float32)
 
 
 def _coast(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
@@ -65,19 +65,19 @@ def _coast(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     shape = chart.shape[:2]
     scale = shape[0] / 256
     height = noise(rng, shape, rng.uniform(1.5, 3), 5) + rng.uniform(-0.4, 0.8)
-    ink = _one(rng, INKS)
-    land, sea = _one(rng, TINTS if rng.random() < 0.6 else PAPERS), _one(rng, SEAS)
+    ink = _pick(rng, INKS)
+    land, sea = _pick(rng, TINTS if rng.random() < 0.6 else PAPERS), _pick(rng, SEAS)
     chart = np.where((height > 0)[..., None], np.float32(land), np.float32(sea)).astype(np.float32)
     slope = np.maximum(_slope(height), 1e-4)
     away = -height / slope  # pixels out to sea, roughly
     for ring in range(1, int(rng.integers(2, 5))):
         gap = 3.5 * ring * scale
-        chart = lay(chart, ink, 0.4 / ring * np.clip(1 - np.abs(away - gap) / scale, 0, 1).astype(np.float32))
-    chart = lay(chart, ink, np.clip(1.1 - np.abs(away) / scale, 0, 1).astype(np.float32))
+        chart = composite(chart, ink, 0.4 / ring * np.clip(1 - np.abs(away - gap) / scale, 0, 1).astype(np.float32))
+    chart = composite(chart, ink, np.clip(1.1 - np.abs(away) / scale, 0, 1).astype(np.float32))
     river = noise(rng, shape, 2, 4)
     thin = np.clip(1 - np.abs(river) / np.maximum(_slope(river), 1e-4) / scale, 0, 1)
-    chart = lay(chart, _one(rng, (*SEAS, ink)), (thin * (height > 0.1)).astype(np.float32))
-    return lay(chart, ink, 0.7 * _hachures(height, rng))
+    chart = composite(chart, _pick(rng, (*SEAS, ink)), (thin * (height > 0.1)).astype(np.float32))
+    return composite(chart, ink, 0.7 * _hachures(height, rng))
 
 
 def _realms(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
@@ -88,13 +88,15 @@ def _realms(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     x, y = x + 12 * scale * noise(rng, shape, 5, 3), y + 12 * scale * noise(rng, shape, 5, 3)
     seeds = rng.uniform(0, 1, (int(rng.integers(4, 9)), 2)) * shape[::-1]
     away = np.stack([np.hypot(x - sx, y - sy) for sx, sy in seeds])
-    tints = np.array([_one(rng, TINTS) for _ in seeds], np.float32)
+    tints = np.array([_pick(rng, TINTS) for _ in seeds], np.float32)
     first, second = np.sort(away, axis=0)[:2]
     rim = np.exp(-(second - first) / (14 * scale)) if rng.random() < 0.5 else np.ones(shape)
-    chart = lay(chart, tints[away.argmin(axis=0)], rim.astype(np.float32))
+    chart = composite(chart, tints[away.argmin(axis=0)], rim.astype(np.float32))
     dashes = np.sin((x + y) / (1.3 * scale)) > -0.3
     border = np.clip(1.5 - (second - first) / (2 * scale), 0, 1) * dashes
-    return lay(lay(chart, _one(rng, INKS), border.astype(np.float32)), _one(rng, INKS), _roads(shape, rng))
+    return composite(
+        composite(chart, _pick(rng, INKS), border.astype(np.float32)), _pick(rng, INKS), _roads(shape, rng)
+    )
 
 
 def _fields(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
@@ -108,18 +110,18 @@ def _fields(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     ditch = np.maximum(ditch, np.clip(1.3 - np.abs((along / block + 0.5) % 1 - 0.5) * block / scale, 0, 1))
     column, row = np.floor(across / strip).astype(int), np.floor(along / block).astype(int)
     tinted = rng.random((61, 61))[column % 61, row % 61] < rng.uniform(0, 0.35)
-    chart = lay(chart, _one(rng, TINTS), tinted.astype(np.float32))
-    chart = lay(chart, _one(rng, INKS), 0.7 * ditch.astype(np.float32))
+    chart = composite(chart, _pick(rng, TINTS), tinted.astype(np.float32))
+    chart = composite(chart, _pick(rng, INKS), 0.7 * ditch.astype(np.float32))
     canal = np.abs(across - rng.uniform(-60, 60) * scale - 20 * scale * noise(rng, shape, 2)) / scale
-    chart = lay(chart, _one(rng, INKS), (canal < 4.5).astype(np.float32))
-    return lay(chart, _one(rng, ((140, 168, 140), (150, 180, 176))), (canal < 3.5).astype(np.float32))
+    chart = composite(chart, _pick(rng, INKS), (canal < 4.5).astype(np.float32))
+    return composite(chart, _pick(rng, ((140, 168, 140), (150, 180, 176))), (canal < 3.5).astype(np.float32))
 
 
 def _town(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     """Blocks of houses between streets."""
     shape = chart.shape[:2]
     scale = shape[0] / 256
-    ink = _one(rng, INKS)
+    ink = _pick(rng, INKS)
     along, across = _turned(shape, rng, bend=10)
     block = rng.uniform(24, 48, 2) * scale
     row, column = np.floor(along / block[0]).astype(int), np.floor(across / block[1]).astype(int)
@@ -129,13 +131,13 @@ def _town(chart: FloatImage, rng: np.random.Generator) -> FloatImage:
     house = (inward > 2.5) & (inward < 8) & (kind < 0.7)
     lot = rng.uniform(3, 5) * scale
     wall = ((along % lot < scale) | (across % lot < scale)) & house
-    chart = lay(
-        chart, _one(rng, ((150, 172, 130), (172, 186, 150))), ((inward > 2.5) & (kind > 0.86)).astype(np.float32)
+    chart = composite(
+        chart, _pick(rng, ((150, 172, 130), (172, 186, 150))), ((inward > 2.5) & (kind > 0.86)).astype(np.float32)
     )
     gone = rng.random((97, 97))[np.floor(along / lot).astype(int) % 97, np.floor(across / lot).astype(int) % 97] < 0.15
-    chart = lay(chart, _one(rng, ROOFS), (house & ~gone).astype(np.float32))
-    chart = lay(chart, ink, 0.55 * wall.astype(np.float32))
-    return lay(chart, ink, 0.6 * np.clip(1 - np.abs(inward - 2), 0, 1).astype(np.float32))
+    chart = composite(chart, _pick(rng, ROOFS), (house & ~gone).astype(np.float32))
+    chart = composite(chart, ink, 0.55 * wall.astype(np.float32))
+    return composite(chart, ink, 0.6 * np.clip(1 - np.abs(inward - 2), 0, 1).astype(np.float32))
 
 
 def _turned(shape: tuple[int, int], rng: np.random.Generator, bend: float) -> tuple[FloatImage, FloatImage]:
@@ -209,5 +211,5 @@ def _slope(field: FloatImage) -> NDArray[np.float32]:
     return np.asarray(np.hypot(*_gradient(field)), np.float32)
 
 
-def _one(rng: np.random.Generator, options: tuple[Any, ...]) -> Any:
+def _pick(rng: np.random.Generator, options: tuple[Any, ...]) -> Any:
     return options[int(rng.integers(len(options)))]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fig2mesh.skeleton import PART
 from fig2mesh.training.drawing.background import PLAIN, draw_background
 from fig2mesh.training.drawing.faces import Face, draw_face
-from fig2mesh.training.drawing.marks import FloatImage, blur, distance, lay, noise, warp
+from fig2mesh.training.drawing.marks import FloatImage, blur, composite, distance, noise, warp
 from fig2mesh.training.drawing.styles import Style, pattern_coverage, random_style
 
 JUMP: Final = 0.05
@@ -71,7 +71,7 @@ def draw(
         hair = style.colours[list(materials).index("hair")] if "hair" in materials else np.array([60, 44, 34])
         canvas = seen & (layers.labels == PART["head"]) & (layers.material == _skin(materials))
         picture = draw_face(picture, face, canvas, style, hair, rng)
-    picture = lay(picture, style.ink, lines)
+    picture = composite(picture, style.ink, lines)
     picture = blur(picture, style.softness * scale)
     if style.speckle:
         picture = np.asarray(picture + style.speckle * rng.standard_normal((*shape, 1)), np.float32)
@@ -153,21 +153,21 @@ def _filled(
     shape, scale = paper.shape[:2], paper.shape[0] / 256
     shade = layers.normals @ np.asarray(style.light, np.float32)
     if style.fill == "paper":
-        blank = lay(
+        blank = composite(
             paper, (255, 255, 255), seen * np.float32(rng.choice([0.7, 1.0] if _is_map(style) else [0.0, 0.6, 1.0]))
         )
         dark = (style.colours.mean(axis=1) < 70)[np.maximum(layers.material, 0)] & seen
-        return lay(blank, style.ink, dark * np.float32(rng.random() < 0.4))
+        return composite(blank, style.ink, dark * np.float32(rng.random() < 0.4))
     colour = style.colours[np.maximum(layers.material, 0)]
     if style.fill != "hatched":
         grain = uv_grain(layers)
         for index, pattern in enumerate(style.patterns):
             if pattern is not None and (here := layers.material == index).any():
-                colour = lay(colour, pattern.colour, here * pattern_coverage(pattern, layers.uv, grain))
+                colour = composite(colour, pattern.colour, here * pattern_coverage(pattern, layers.uv, grain))
     if style.fill == "steps":
         colour = colour * np.where(shade < rng.uniform(0.35, 0.6), rng.uniform(0.68, 0.85), 1)[..., None]
         if rng.random() < 0.3:
-            colour = lay(colour.astype(np.float32), (255, 255, 255), (0.35 * (shade > 0.96)).astype(np.float32))
+            colour = composite(colour.astype(np.float32), (255, 255, 255), (0.35 * (shade > 0.96)).astype(np.float32))
     elif style.fill == "soft":
         colour = colour * (0.6 + 0.4 * np.clip(shade, 0, 1))[..., None]
     cover = seen.astype(np.float32)
@@ -185,7 +185,7 @@ def _filled(
         colour, cover = warp(colour, right, down, nearest=True), warp(cover, right, down)
     if style.glaze:
         colour = colour * paper / 255
-    picture = lay(paper, colour, np.asarray(cover, np.float32))
+    picture = composite(paper, colour, np.asarray(cover, np.float32))
     return _hatched(picture, layers, shade, seen, style, rng) if style.fill == "hatched" else picture
 
 
@@ -200,7 +200,7 @@ def _hatched(
     """Engraved hatching, thicker and crossed where it is darker; it bends with the form."""
     shape, scale = picture.shape[:2], picture.shape[0] / 256
     tone = style.colours.mean(axis=1)[np.maximum(layers.material, 0)] / 255
-    pale = lay(picture, (250, 246, 238), seen * np.float32(rng.uniform(0.4, 1)))
+    pale = composite(picture, (250, 246, 238), seen * np.float32(rng.uniform(0.4, 1)))
     y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
     form = np.where(seen, layers.depth, 0) * shape[0] * 0.15
     angle, gap = rng.uniform(0, np.pi), rng.uniform(2.6, 4) * scale
@@ -210,7 +210,7 @@ def _hatched(
         wave = 2 * np.abs((line / gap) % 1 - 0.5) * gap / 2  # distance from mid-gap, pixels
         width = np.clip((dark - start) * 1.1, 0, 1) * gap * 0.75
         lines = np.clip(width / 2 - (gap / 2 - wave) + 0.5, 0, 1) * np.minimum(width, 1) * seen
-        pale = lay(pale, style.ink, lines.astype(np.float32))
+        pale = composite(pale, style.ink, lines.astype(np.float32))
     return pale
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.training.drawing.marks import FloatImage, ellipse, lay, stroke
+from fig2mesh.training.drawing.marks import FloatImage, composite, ellipse, stroke
 from fig2mesh.training.drawing.styles import Style
 
 
@@ -59,13 +59,13 @@ def draw_face(
     if rng.random() < 0.25:  # cheeks
         for side in (-1, 1):
             cheek = ellipse(shape, place(side * 0.6 * narrow + 0.2 * turn, -0.35), (0.22 * size, 0.18 * size))
-            picture = lay(picture, (226, 110, 100), 0.35 * cheek * canvas)
+            picture = composite(picture, (226, 110, 100), 0.35 * cheek * canvas)
     if style.beard != "none":
-        picture = lay(picture, hair, _beard(style.beard, shape, mouth, right, down, size, narrow) * canvas)
+        picture = composite(picture, hair, _beard(style.beard, shape, mouth, right, down, size, narrow) * canvas)
     for eye in eyes:
         if style.eyes == "open" or dark:
             white = ellipse(shape, eye, (0.26 * size * narrow, 0.17 * size), float(np.arctan2(right[1], right[0])))
-            picture = lay(picture, (252, 252, 250), white * canvas)
+            picture = composite(picture, (252, 252, 250), white * canvas)
             arc = [place(x * narrow, -0.17 * (1 - (x / 0.27) ** 2), eye) for x in np.linspace(-0.27, 0.27, 5)]
             stroke(black, arc, 0.07 * size)
         radii = (0.1 * size, 0.1 * size) if style.eyes != "ovals" else (0.08 * size, 0.16 * size)
@@ -86,10 +86,10 @@ def draw_face(
     elif rng.random() < 0.25:
         red = np.zeros(shape, np.float32)
         stroke(red, lips, 0.16 * size)
-        picture = lay(picture, (186, 60, 60), red * canvas)
+        picture = composite(picture, (186, 60, 60), red * canvas)
     stroke(black, lips, 0.08 * size)
-    picture = lay(picture, np.minimum(hair, 150), brows * canvas)
-    return lay(picture, np.minimum(style.ink, 90), black * canvas)
+    picture = composite(picture, np.minimum(hair, 150), brows * canvas)
+    return composite(picture, np.minimum(style.ink, 90), black * canvas)
 
 
 def _beard(

@@ -166,7 +166,7 @@ def write(coverage: FloatImage, text: str, at: Any, height: float, angle: float 
     np.maximum(coverage[rows, columns], ink, out=coverage[rows, columns])
 
 
-def lay(picture: FloatImage, colour: Any, coverage: FloatImage) -> FloatImage:
+def composite(picture: FloatImage, colour: Any, coverage: FloatImage) -> FloatImage:
     """Alpha composite a colour, or another picture, over the picture (H, W, 3); `coverage` (H, W) is its alpha."""
     return np.asarray(picture + (np.asarray(colour, np.float32) - picture) * coverage[..., None], np.float32)
 

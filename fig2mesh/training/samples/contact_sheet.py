@@ -17,7 +17,7 @@ from exporters.atomic_file import atomic_path
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.field.camera import VIEW_YAW_DEG, axes
 from fig2mesh.skeleton import BODY_PARTS, BONES, JOINT, PART
-from fig2mesh.training.drawing.marks import FloatImage, lay, stroke
+from fig2mesh.training.drawing.marks import FloatImage, composite, stroke
 
 TILE: Final = 112
 """Edge of one picture on the sheet, pixels."""
@@ -108,10 +108,12 @@ def _tiles(arrays: Body) -> list[FloatImage]:
             for kind in ("mask_amodal", "mask_visible")
         )
         # Hidden: pale. Seen: the part's colour.
-        mask = lay(np.full((*seen.shape, 3), PAPER, np.float32), (200, 200, 204), whole)
-        tiles.append(_fit(lay(mask, colours[PART[name]], seen)))
+        mask = composite(np.full((*seen.shape, 3), PAPER, np.float32), (200, 200, 204), whole)
+        tiles.append(_fit(composite(mask, colours[PART[name]], seen)))
     tiles.append(
-        _skeleton(lay(colours[labels[0]], (255, 255, 255), np.full((TILE, TILE), 0.55, np.float32)), arrays["joints"])
+        _skeleton(
+            composite(colours[labels[0]], (255, 255, 255), np.full((TILE, TILE), 0.55, np.float32)), arrays["joints"]
+        )
     )
     for tile in tiles:
         tile[-1:], tile[:, -1:] = EMPTY - 40, EMPTY - 40
@@ -126,7 +128,7 @@ def _skeleton(picture: FloatImage, joints: NDArray[Any]) -> FloatImage:
         line = np.zeros(picture.shape[:2], np.float32)
         stroke(line, pixels[[JOINT[start], JOINT[end]]], 1.3)
         stroke(line, pixels[JOINT[end]], 3.2)
-        picture = lay(picture, SIDE_INK.get(end[0], INK) if end[1] == "_" else INK, line)
+        picture = composite(picture, SIDE_INK.get(end[0], INK) if end[1] == "_" else INK, line)
     return picture
 
 

@@ -43,7 +43,7 @@ def test_training_never_meets_what_is_held_out_and_validation_does() -> None:
 
 @pytest.mark.parametrize("split", SPLITS)
 def test_subjects_stand_as_high_as_the_paper_says(split: str) -> None:
-    """A limb tells the scale: it is as long as at rest, times what makes the rest stance 1.79 high."""
+    """A limb gives the scale: it is as long as at rest, times what makes the rest stance 1.79 high."""
     for subject in drawn(split, 10):
         scale = FIGURE_HEIGHT / np.ptp(subject.rig.vertices[:, 1])
         for first, last in (("l_hip", "l_knee"), ("r_shoulder", "r_elbow"), ("neck", "thorax")):
