@@ -94,4 +94,4 @@ def test_bad_input_is_told_in_one_line(
 
 def test_assets_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["globe"]) == 2
-    assert "ASSET" in capsys.readouterr().err
+    assert "MODEL" in capsys.readouterr().err
