@@ -169,7 +169,7 @@ def normalise_poses(rotations: NDArray[np.floating]) -> Rotations:
 
 
 def plausible(rotations: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """(N,) True where a pose is upright (trunk within 70 degrees) and its limbs stay out of trunk, head and each other."""
+    """(N,) True where a pose is upright (trunk within 70°) and its limbs stay out of trunk, head and each other."""
     joints = canonical_joints(rotations)
     at = {key: joints[:, index] for key, index in KEY.items()}
     trunk = at["spine3"] / np.linalg.norm(at["spine3"], axis=1, keepdims=True)
