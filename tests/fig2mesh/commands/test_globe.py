@@ -92,6 +92,6 @@ def test_bad_input_is_reported_in_one_line(
     assert err.count("\n") == 1
 
 
-def test_assets_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_models_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["globe"]) == 2
-    assert "ASSET" in capsys.readouterr().err
+    assert "MODEL" in capsys.readouterr().err

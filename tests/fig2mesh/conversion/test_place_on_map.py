@@ -245,7 +245,7 @@ BAD = {
     "too few": (["--map", "map.png", "--map-transform", "poly3"], "7 control points, but poly3 needs 10"),
     "transform": (["--map", "map.png", "--map-transform", "magic"], "'magic' is not one of"),
     "altitude": (["--map", "map.png", "--altitude", "nan"], "--altitude"),
-    "facing": (["--map", "map.png", "--facing", "up"], "no direction"),
+    "facing": (["--map", "map.png", "--facing", "up"], "is not a direction"),
     "clamp without place": (["--altitude-mode", "clamp"], "--altitude-mode: requires a place"),
     "clamp to a datum": (
         ["--map", "map.png", "--altitude-mode", "clamp", "--altitude-datum", "egm96"],
