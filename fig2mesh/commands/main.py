@@ -147,7 +147,7 @@ def main(arguments: list[str] | None = None) -> int:
     from georef.errors import InputError
 
     words = sys.argv[1:] if arguments is None else arguments
-    # Pillow warns of damaged tags, in two lines with a path of its own; what matters our readers say themselves.
+    # Pillow warns about damaged tags, in two lines with its own path; our readers report what matters themselves.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     try:
         result = cli.main(words, prog_name="fig2mesh", standalone_mode=False)

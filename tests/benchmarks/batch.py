@@ -1,7 +1,7 @@
 """Throughput of `fig2mesh batch`: `python -m tests.benchmarks.batch [--rows N] [--grow N ...] [--dry N ...] OUT.json`.
 
 The rows are the shipped figures over and over, each with a seed of its own, so that every row is converted but for its
-reading; or (--grow, --dry) with a place of its own only, which shows what a row costs besides its conversion.
+reading; or (--grow, --dry) with nothing but a different place, which shows the overhead of a row.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What each effect costs, as a share of a plain frame: `python -m tests.benchmarks.effects docs/effects.md`.
+"""Cost of each effect, as a share of a plain frame: `python -m tests.benchmarks.effects docs/effects.md`.
 
 Each effect is timed in turn with the plain frame, in processor time, and the median of the pairs' ratios is written:
 machines are noisy, but both halves of a pair run within a second.
@@ -61,9 +61,9 @@ def table(scene: FieldScene, smooth: FieldScene) -> str:
         f"| | tracing alone | {ratio(bare, lambda: render(scene, plain)):.2f} | {SIZE[0] * SIZE[1]:,} | | | |",
     ]
     for mode, effects in ROWS:
-        asked, at = request(mode, *effects), smooth if "smooth-union" in effects else scene
-        cost = ratio(lambda at=at, asked=asked: render(at, asked), lambda: render(scene, plain))
-        counts = asdict(render(at, asked).counts)
+        requested, at = request(mode, *effects), smooth if "smooth-union" in effects else scene
+        cost = ratio(lambda at=at, requested=requested: render(at, requested), lambda: render(scene, plain))
+        counts = asdict(render(at, requested).counts)
         further = [
             f"{counts[f'{name}_rays']:,} {title}"
             for name, title in (("sight", "to the viewer"), ("shadow", "to the lamp"), ("ao", "for ao"))
@@ -107,7 +107,7 @@ Rays from the camera go by tiles (`fig2mesh.render.frame`): those of tiles that 
 without being traced, the others start next to the surface. Further rays start on the surface and are traced one by one
 (`fig2mesh.field.trace`), hence each costs more.
 
-What is not asked for is not done: `depth` and `parts` have no normals and no textures, and no frame has rays to a lamp
+Only requested work is done: `depth` and `parts` have no normals and no textures, and no frame has rays to a lamp
 or for occlusion that it does not show. The numbers of `--report JSON` are those of the table, and tests hold them.
 The figure covers a quarter of the picture; costs of colours and light grow with what it covers.
 `smooth-union` is done once, before the first frame.

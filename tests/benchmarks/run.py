@@ -61,7 +61,7 @@ def whole_figures(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def tracing() -> dict[str, dict[str, Any]]:
-    """Frames a second of a turntable with normals and colours, and Embree on the isosurface of the field beside it."""
+    """Frames per second of a turntable with normals and colours, and of Embree on the isosurface of the same field."""
     from tests.benchmarks.frames import VIEWS, drawn, measure
 
     farmer = drawn("farmer")
@@ -109,7 +109,7 @@ def decoding() -> dict[str, dict[str, Any]]:
     dense = statistics.median(_seconds(lambda: [decode_dense(*part) for part in work]) for _ in range(3))
     share = 100 * sum(counts) / (len(counts) * 64**3)
     return {
-        "decode_s": _value(fast, "s", f"14 parts at 64³, {share:.0f} % of the nodes asked for; median of 3"),
+        "decode_s": _value(fast, "s", f"14 parts at 64³, {share:.0f} % of the nodes requested; median of 3"),
         "decode_dense_s": _value(dense, "s", "14 parts at 64³, every node; median of 3"),
     }
 

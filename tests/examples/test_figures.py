@@ -122,14 +122,14 @@ def test_the_files_are_small(name):
         assert path.stat().st_size < 200_000, path
 
 
-def test_a_figure_in_two_pieces_is_refused():
+def test_a_figure_in_two_pieces_is_rejected():
     rgba = np.zeros((8, 8, 4), np.uint8)
     rgba[1:3, 1:3, 3] = rgba[5:7, 5:7, 3] = 255
     with pytest.raises(ValueError, match="2 pieces"):
         _module().mask_of(Image.fromarray(rgba))
 
 
-def test_a_drawing_with_a_missing_joint_is_refused(tmp_path):
+def test_a_drawing_with_a_missing_joint_is_rejected(tmp_path):
     svg = (FIGURES / "farmer" / "figure.svg").read_text(encoding="utf-8").replace("joint-l_knee", "joint-knee")
     (tmp_path / "figure.svg").write_text(svg, encoding="utf-8")
     with pytest.raises(ValueError, match="l_knee"):

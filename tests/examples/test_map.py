@@ -71,7 +71,7 @@ def test_people_come_to_stand_where_the_map_shows_them(tmp_path: Path) -> None:
     *made, tileset = map(Path, done.stdout.splitlines())
     assert all(path.is_file() for path in (*made, tileset))
     assert sorted(path.stem for path in made if path.suffix == ".usdc") == ["farmer", "footballer", "market_woman"]
-    # The map is 50 km across: its people are seen from where all of it is.
+    # The map is 50 km across: its figures are visible from where the whole map is.
     assert 103.9 * json.loads(tileset.read_text())["geometricError"] > 1e6
     models = [path for path in made if path.suffix == ".glb"]
     assert [path.name for path in models] == ["footballer.glb", "market_woman.glb", "farmer.glb"]

@@ -1,4 +1,4 @@
-"""The example script and the commands of the README do what they say."""
+"""The example script and the commands of the README work."""
 
 from __future__ import annotations
 

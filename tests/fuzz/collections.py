@@ -59,7 +59,7 @@ def read_collection(path: Path) -> None:
 
 
 def records() -> Iterator[Input]:
-    """What a batch notes of a figure."""
+    """Record of a figure in a batch."""
     from fig2mesh.batch.ledger import Ledger
 
     with tempfile.TemporaryDirectory() as name:

@@ -1,6 +1,6 @@
 """Damage guided by coverage: `python -m tests.fuzz.guided READER [libFuzzer's options]`, for readers in pure Python.
 
-Atheris watches which branches of our packages an input takes and goes on from those that take new ones. What it finds
+Atheris records which branches of our packages an input takes and continues from those that take new ones. What it finds
 is written to the current folder as crash-…; the seeds are those of `tests.fuzz.readers`. `-max_total_time=60` ends it.
 """
 
@@ -17,7 +17,7 @@ PURE = ("joints", "world-file", "points", "annotation", "glb", "b3dm", "tileset"
 
 
 def main() -> None:
-    """Fuzz one reader until it fails, or libFuzzer's options say that it is enough."""
+    """Fuzz one reader until it fails, or until a limit of libFuzzer's options."""
     if len(sys.argv) < 2 or sys.argv[1] not in PURE:
         raise SystemExit(f"python -m tests.fuzz.guided READER, one of {', '.join(PURE)}")
     name = sys.argv.pop(1)
@@ -39,7 +39,7 @@ def main() -> None:
         (corpus / f"{number}").write_bytes(bytes([number]) + each.files[each.main])
 
     def one(data: bytes) -> None:
-        # The first byte says which seed gives the files beside the main one.
+        # The first byte selects the seed whose other files accompany the main one.
         base = intact[data[0] % len(intact)] if data else intact[0]
         path = type(base)(base.main, base.files | {base.main: data[1:]}).put(work)
         try:

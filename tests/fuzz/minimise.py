@@ -26,7 +26,7 @@ SECONDS = 60.0
 
 
 def kind_of(found: str) -> str:
-    """What has to stay the same: the kind of error and where it was raised."""
+    """Invariant of the minimisation: the kind of error and where it was raised."""
     return f"{found.partition(':')[0]}@{found.rpartition('@')[2]}" if "@" in found else found.partition(":")[0]
 
 
@@ -94,8 +94,8 @@ def minimised(reader: str, case: Input, seconds: float = SECONDS) -> tuple[Input
             room.mkdir()
             return outcome(READERS[reader], tried.put(room))
 
-        said = fails(case)
-        wanted = kind_of(said)
+        finding = fails(case)
+        wanted = kind_of(finding)
 
         def shrunk(now: Input, tries: Iterator[Input]) -> Input | None:
             for tried in tries:
@@ -121,7 +121,7 @@ def minimised(reader: str, case: Input, seconds: float = SECONDS) -> tuple[Input
                 if found is not None:
                     break
             if found is None:
-                return case, said
+                return case, finding
             case = found
 
 

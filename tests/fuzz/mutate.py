@@ -390,7 +390,7 @@ BY_SUFFIX: dict[str, Mutation] = {
     ".mtl": damaged_text, ".csv": damaged_text, ".safetensors": damaged_safetensors,
 }
 # fmt: on
-"""What suits a kind of file; any other is damaged as bytes."""
+"""Mutation for each kind of file; others are damaged as bytes."""
 
 
 def mutated(files: dict[str, bytes], main: str, rng: random.Random) -> dict[str, bytes]:

@@ -1,7 +1,7 @@
 """Every reader of files from elsewhere: seeds, how it is called, and what it may cost.
 
 A further reader is one more entry of `READERS`: a function that makes intact inputs and one that reads the main file.
-What it returns is thrown away; what is wrong with a returned record, the function says itself by an assertion.
+Its result is discarded; the function itself asserts that a returned record is valid.
 """
 
 from __future__ import annotations
@@ -205,6 +205,6 @@ READERS: dict[str, Reader] = {
 
 
 def assert_one_line(text: str) -> None:
-    """What is shown to people is one line of printable characters, and not too long for one."""
+    """Messages for people are one line of printable characters, of reasonable length."""
     assert text.isprintable(), f"not one printable line: {text[:200]!r}"
     assert len(text) < 2500, f"a line of {len(text)} characters: {text[:200]!r}"

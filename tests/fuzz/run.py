@@ -1,7 +1,7 @@
 """Feed every reader with damaged files: `python -m tests.fuzz.run [--reader NAME]... [--inputs N] [--seconds S]`.
 
-Each reader runs in a process of its own with limits on memory and time; where it dies, it goes on behind the input that
-killed it. The table says what became of the inputs. What was found is kept under build/fuzz, one folder an input.
+Each reader runs in a process of its own with limits on memory and time; if it dies, it resumes after the input that
+killed it. The table counts the outcomes of the inputs. Findings are stored under build/fuzz, one folder per input.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_DEATHS = 40
 
 @dataclass
 class Tally:
-    """What became of a reader's inputs; findings : text → numbers of the inputs."""
+    """Outcomes of a reader's inputs; findings : text → numbers of the inputs."""
 
     inputs: int = 0
     accepted: int = 0
@@ -43,7 +43,7 @@ class Tally:
     findings: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, text: str, number: int) -> None:
-        """Findings of the same kind at the same place are one, whatever their message says."""
+        """Findings of the same kind at the same place count as one, whatever their messages."""
         kind, place = text.partition(":")[0], text.rpartition("@")[2]
         known = next((k for k in self.findings if (k.partition(":")[0], k.rpartition("@")[2]) == (kind, place)), text)
         self.findings.setdefault(known, []).append(number)
@@ -96,11 +96,11 @@ def _process(
     stuck: list[bool] = []
 
     def watch() -> None:
-        seen, since = -1, time.monotonic()
+        latest_number, since = -1, time.monotonic()
         while not done.wait(2.0):
             number = int.from_bytes(at.read_bytes(), "little")
-            if number != seen:
-                seen, since = number, time.monotonic()
+            if number != latest_number:
+                latest_number, since = number, time.monotonic()
             elif time.monotonic() - since > STUCK_S:
                 stuck.append(True)
                 process.kill()
@@ -111,13 +111,13 @@ def _process(
     finished, latest = False, {"accepted": 0, "refused": 0, "slowest": 0.0, "slowest_number": -1}
     assert process.stdout is not None
     for line in process.stdout:
-        told = json.loads(line)
-        if "finding" in told:
-            tally.add(told["finding"], told["number"])
+        report = json.loads(line)
+        if "finding" in report:
+            tally.add(report["finding"], report["number"])
         else:
-            latest = told["counts"]
-            finished = told.get("done", False)
-            tally.peak_mb = max(tally.peak_mb, told.get("peak_mb", 0))
+            latest = report["counts"]
+            finished = report.get("done", False)
+            tally.peak_mb = max(tally.peak_mb, report.get("peak_mb", 0))
     process.wait()
     done.set()
     watcher.join()

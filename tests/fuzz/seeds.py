@@ -220,7 +220,7 @@ def height_grids() -> Iterator[Input]:
 
 
 def written(name: str, **changes: Any) -> Input:
-    """What our own writer makes of a capsule."""
+    """A capsule, written by our own writer."""
     import tempfile
 
     from exporters.write import write
@@ -269,7 +269,7 @@ def glbs() -> Iterator[Input]:
 
 
 def gltfs() -> Iterator[Input]:
-    """glTF with its buffer and picture beside it, and of another program."""
+    """glTF with separate buffer and picture, and glTF of another program."""
     yield written("main.gltf")
     yield foreign_gltf()
 
@@ -301,7 +301,7 @@ def b3dms() -> Iterator[Input]:
 
 
 def entities() -> Iterator[Input]:
-    """CZML and GeoJSON with their models beside them."""
+    """CZML and GeoJSON with their models."""
     yield written("main.czml")
     yield written("main.geojson")
 

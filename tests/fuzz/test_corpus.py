@@ -30,13 +30,13 @@ def intact() -> dict[str, list[Input]]:
 
 
 @pytest.mark.parametrize("folder", KEPT, ids=lambda folder: f"{folder.parent.name}/{folder.name}")
-def test_what_once_broke_a_reader_is_refused_or_read(folder: Path, tmp_path: Path) -> None:
+def test_what_once_broke_a_reader_is_rejected_or_read(folder: Path, tmp_path: Path) -> None:
     found = outcome(READERS[folder.parent.name], taken(folder).put(tmp_path))
     assert found in ("", "refused")
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_damaged_files_are_refused_or_read(
+def test_damaged_files_are_rejected_or_read(
     name: str, intact: dict[str, list[Input]], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.CRITICAL)
@@ -60,14 +60,14 @@ def test_the_corpus_is_small() -> None:
 
 
 @pytest.mark.parametrize(
-    ("read", "said"),
+    ("read", "expected"),
     [
         (lambda path: path.read_bytes()[99], "IndexError"),
         (lambda path: int(path.read_bytes()), "ValueError"),
         (lambda path: None, ""),
     ],
 )
-def test_the_harness_tells_errors_from_refusals(read: object, said: str, tmp_path: Path) -> None:
+def test_the_harness_distinguishes_errors_from_refusals(read: object, expected: str, tmp_path: Path) -> None:
     path = tmp_path / "main.txt"
     path.write_bytes(b"x")
-    assert outcome(Reader(lambda: iter(()), read), path).partition(":")[0] == said  # type: ignore[arg-type]
+    assert outcome(Reader(lambda: iter(()), read), path).partition(":")[0] == expected  # type: ignore[arg-type]

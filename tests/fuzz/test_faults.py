@@ -1,4 +1,4 @@
-"""A mistake of ours inside a reader is an internal error: it must not pass for a damaged file."""
+"""A bug in a reader is an internal error: it must not be reported as a damaged file."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_a_mistake_in_a_reader_goes_through(
         try:
             reader.read(each.put(room))
         except InputError as error:
-            pytest.fail(f"it is said of {each.main}: {error}")
+            pytest.fail(f"reported as a fault of {each.main}: {error}")
         except kind as error:
             raised.append(str(error))
     assert set(raised) == {"planted"}

@@ -42,7 +42,7 @@ from tests.fuzz.worker import outcome
 
 
 def png(width: int, height: int, data: bytes, *chunks: tuple[bytes, bytes], interlace: int = 0) -> bytes:
-    """A grey PNG of 8 bits that says so much of itself; data : packed rows."""
+    """A grey PNG of 8 bits with a given header; data : packed rows."""
     head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, interlace)
     parts = [(b"IHDR", head), *chunks, (b"IDAT", data), (b"IEND", b"")]
     return b"\x89PNG\r\n\x1a\n" + b"".join(
@@ -298,7 +298,7 @@ def test_a_stage_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
     data = bytearray((tmp_path / "lift.npz").read_bytes())
     for place in range(len(data) - 46):
         if data[place : place + 4] == b"PK\1\2":
-            struct.pack_into("<I", data, place + 24, 1 << 30)  # what the directory says of each member
+            struct.pack_into("<I", data, place + 24, 1 << 30)  # the size of each member in the directory
     (tmp_path / "lift.npz").write_bytes(data)
     with pytest.raises(FigureError, match=r"unpacks to 3.22 GB, more than 2.15 GB"):
         FolderStore(tmp_path).read_file("lift", Pose3D)

@@ -64,7 +64,7 @@ def outcome(reader: Reader, path: Path) -> str:
 
 
 def _where() -> str:
-    """The last line of ours that a traceback goes through, and the very last."""
+    """The last line of our packages in a traceback, and the very last line."""
     frames = traceback.extract_tb(sys.exc_info()[2])
     own = [f for f in frames if any(f"/{part}/" in f.filename for part in ("georef", "exporters", "fig2mesh"))]
     shown = [*own[-1:], *frames[-1:]]
@@ -89,7 +89,7 @@ def arm() -> None:
 
 
 def timed(reader: Reader, path: Path) -> tuple[str, float]:
-    """What came of a file, and seconds of processor time."""
+    """Outcome of a file, and seconds of processor time."""
     start = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, CPU_S)
     signal.setitimer(signal.ITIMER_REAL, WALL_S)

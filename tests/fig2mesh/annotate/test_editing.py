@@ -1,4 +1,4 @@
-"""What page and program send each other, what is saved, and whom the server answers."""
+"""Annotation: messages between page and server, saved files, and access to the server."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_what_is_sent_comes_back(seed: int) -> None:
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4000), st.integers(1, 255), st.booleans())
 @settings(max_examples=300)
-def test_damaged_messages_are_refused_or_harmless(seed: int, place: int, flip: int, cut: bool) -> None:
+def test_damaged_messages_are_rejected_or_harmless(seed: int, place: int, flip: int, cut: bool) -> None:
     subject, annotation = some(seed)
     message = bytearray(packed(subject, annotation))
     place %= len(message)
@@ -85,7 +85,7 @@ def test_saved_files_read_back_as_they_were(files: DrawnFiles, tmp_path: Path) -
         assert json.loads(image.info["legend"])["17"] == "prop"
         x, y = figure.joints_px[JOINT["thorax"]].astype(int).tolist()
         assert image.convert("RGB").getpixel((x, y)) == LABEL_COLOURS[17]
-    with pytest.raises(InputError, match="exists already"):
+    with pytest.raises(InputError, match="already exists"):
         write_annotation(folder, start, "drawn.png")
     assert read_figure(files.image, keypoints=folder / "keypoints.json").depth_order == {"r_arm": "front"}
 

@@ -59,7 +59,7 @@ def task_of(values: Mapping[str, Any], name: str = "person", number: int = 1) ->
 
 
 def tree(folder: Path) -> dict[str, str]:
-    """Every file that a user sees below a folder, with its digest; of the manifest all but the seconds."""
+    """Every visible file in a folder, with its digest; of the manifest everything except the seconds."""
     found = {}
     for path in sorted(folder.rglob("*")):
         inner = path.relative_to(folder)

@@ -118,7 +118,7 @@ def test_one_worker_and_another_order_of_ends_give_the_same_bytes(
     assert tree(tmp_path) == tree(converted)
 
 
-def test_a_changed_collection_changes_what_it_says(collection: Path, converted: Path, tmp_path: Path) -> None:
+def test_a_changed_collection_changes_the_summary(collection: Path, converted: Path, tmp_path: Path) -> None:
     import shutil
 
     shutil.copytree(converted, tmp_path / "out")
@@ -134,10 +134,10 @@ def test_a_dry_run_reports_all_problems_and_writes_nothing(
     collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["batch", str(collection), "-o", str(tmp_path / "out"), "--dry-run"]) == 2
-    said = capsys.readouterr().err
+    printed = capsys.readouterr().err
     for number, name in zip(range(3, 8), BAD, strict=True):
-        assert f"row {number}, {name}: " in said
-    assert "9 rows: 4 are fine, 5 are not" in said
+        assert f"row {number}, {name}: " in printed
+    assert "9 rows: 4 valid, 5 invalid" in printed
     assert not (tmp_path / "out").exists()
 
 
@@ -145,15 +145,15 @@ def test_a_dry_run_reports_all_problems_and_writes_nothing(
     ("words", "message"),
     [
         (["nothing.csv", "-o", "out"], "nothing.csv"),
-        (["people.csv"], "-o: no folder for the outputs; pass -o DIR"),
+        (["people.csv"], "-o: no output folder; give -o DIR"),
         (["people.csv", "-o", "people.csv"], "people.csv: not a directory"),
-        (["people.csv", "-o", "out", "--engine", "dask"], "--engine dask: no scheduler is named"),
-        (["people.csv", "-o", "out", "--address", "tcp://127.0.0.1:1"], "--address: given without --engine dask"),
-        (["people.csv", "-o", "out", "--root", "nowhere"], "--root: no folder nowhere"),
+        (["people.csv", "-o", "out", "--engine", "dask"], "--engine dask: requires --address"),
+        (["people.csv", "-o", "out", "--address", "tcp://127.0.0.1:1"], "--address: requires --engine dask"),
+        (["people.csv", "-o", "out", "--root", "nowhere"], "--root: no such directory nowhere"),
         (["empty.csv", "-o", "out"], "empty.csv: has no rows"),
     ],
 )
-def test_what_cannot_be_begun_is_one_line(
+def test_unusable_requests_are_one_line(
     collection: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -163,12 +163,12 @@ def test_what_cannot_be_begun_is_one_line(
     monkeypatch.chdir(collection.parent)
     Path("empty.csv").write_text("figure,lon,lat\n")
     assert main(["batch", *words]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
+    printed = capsys.readouterr().err
+    assert message in printed
+    assert printed.count("\n") == 1
 
 
-def test_files_of_others_and_a_second_batch_are_refused(
+def test_files_of_others_and_a_second_batch_are_rejected(
     collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from filelock import FileLock
@@ -220,12 +220,12 @@ def test_formats_and_date_of_the_command_line_are_made(
         assert item.properties["start_datetime"].startswith("1893-05-17")
     for suffix in FORMATS:
         assert main([*words, "--dry-run", "--format", suffix, "--date", "1893"]) == 0
-        assert "3 rows: 3 are fine, 0 are not" in capsys.readouterr().err
+        assert "3 rows: 3 valid, 0 invalid" in capsys.readouterr().err
     for option, value in (("--format", "doc"), ("--date", "around 1893")):
         assert main([*words, "-o", str(tmp_path / "none"), option, value]) == 2
-        said = capsys.readouterr().err
-        assert f"{option}: {value!r}" in said or f"{option}: {value};" in said
-        assert said.count("\n") == 1
+        printed = capsys.readouterr().err
+        assert f"{option}: {value!r}" in printed or f"{option}: {value};" in printed
+        assert printed.count("\n") == 1
         assert not (tmp_path / "none").exists()
 
 
@@ -279,7 +279,7 @@ def test_killed_at_any_moment_a_rerun_ends_with_the_same_bytes(
         for _ in range(chance.randint(1, 9)):
             if not process.stdout.readline():
                 break
-        time.sleep(chance.random() / 5)  # not only at the moment at which something is said
+        time.sleep(chance.random() / 5)  # not only when a message is printed
         with suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()

@@ -92,7 +92,7 @@ def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: A
         ({"figure": "a", "save_stages": "x"}, "column save_stages: is set by the batch"),
     ],
 )
-def test_what_is_wrong_is_said_of_the_column(row: dict[str, Any], message: str) -> None:
+def test_errors_name_the_column(row: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as caught:
         request_of(row, {}, "n")
     assert str(caught.value).startswith(message)
@@ -133,6 +133,6 @@ def test_options_of_one_figure_are_no_defaults() -> None:
 @given(
     st.dictionaries(st.sampled_from(list(fields_by_column())), st.text() | st.floats() | st.integers() | st.booleans())
 )
-def test_any_values_are_taken_or_refused(values: dict[str, Any]) -> None:
+def test_any_values_are_taken_or_rejected(values: dict[str, Any]) -> None:
     with suppress(InputError):
         assert request_of({"figure": "a.png", **values}, {}, "n").figure == Path("a.png")

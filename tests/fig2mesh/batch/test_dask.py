@@ -137,12 +137,12 @@ def test_a_worker_is_killed_and_the_bytes_are_those_of_local_processes(
 def test_no_scheduler_is_one_line(collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["batch", str(collection), "-o", str(tmp_path), "--engine", "dask", "--address", "tcp://127.0.0.1:9"]
     assert main(words) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "--address tcp://127.0.0.1:9: no scheduler answers" in said
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1
+    assert "--address tcp://127.0.0.1:9: no scheduler answers" in printed
 
 
-def test_a_worker_of_another_version_is_refused(
+def test_a_worker_of_another_version_is_rejected(
     collection: Path,
     cluster: Cluster,
     tmp_path: Path,

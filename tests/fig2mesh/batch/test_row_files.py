@@ -27,13 +27,13 @@ def test_files_inside_are_found_by_any_way_to_write_them(roots: Roots) -> None:
 
 
 @pytest.mark.parametrize("text", ["../secret.png", "pictures/../../secret.png", "/etc/passwd", "../nothing.png"])
-def test_paths_that_lead_out_are_refused(roots: Roots, text: str) -> None:
+def test_paths_that_lead_out_are_rejected(roots: Roots, text: str) -> None:
     with pytest.raises(InputError, match="leads out of") as caught:
         roots.resolve("figure", Path(text))
     assert "--root" in str(caught.value)
 
 
-def test_links_that_lead_out_are_refused_whether_of_files_or_folders(roots: Roots) -> None:
+def test_links_that_lead_out_are_rejected_whether_of_files_or_folders(roots: Roots) -> None:
     (roots.base / "link.png").symlink_to(roots.base.parent / "secret.png")
     (roots.base / "up").symlink_to(roots.base.parent)
     for text in ("link.png", "up/secret.png"):
@@ -48,7 +48,7 @@ def test_links_inside_and_a_wider_root_are_taken(roots: Roots) -> None:
     assert wide.resolve("figure", Path("../secret.png")).read_bytes() == b"s"
 
 
-def test_names_that_no_file_can_have_are_refused(roots: Roots) -> None:
+def test_names_that_no_file_can_have_are_rejected(roots: Roots) -> None:
     (roots.base / "loop").symlink_to("loop")
     for text in ("a\0b.png", "loop", "x" * 5000, "pictures", "missing.png", ""):
         with pytest.raises(InputError) as caught:

@@ -1,4 +1,4 @@
-"""One row: what runs, what is kept, what is made anew, and what no fault may leave behind."""
+"""One row: stages run, results kept and made again, and no traces of failures."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_a_row_is_what_the_main_job_makes(batch: Batch, folder: Path, tmp_path: 
     assert target.read_bytes() == (batch.folder / "person" / "person.glb").read_bytes()
 
 
-def test_the_record_says_what_was_made_of_what(batch: Batch, folder: Path) -> None:
+def test_the_record_lists_inputs_and_outputs(batch: Batch, folder: Path) -> None:
     record = Ledger(batch.folder).read("person")
     assert record is not None
     assert set(record["inputs"]) == {"person0.png", "person0.json"}
@@ -254,7 +254,7 @@ def test_a_check_of_a_good_row_finds_nothing_and_writes_nothing(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_is_said_and_the_next_run_completes(
+def test_a_full_disk_is_reported_and_the_next_run_completes(
     folder: Path, row: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*arguments: Any, **more: Any) -> None:

@@ -1,4 +1,4 @@
-"""`fig2mesh data`: what cannot be done is told in one line with exit code 2; help needs nothing heavy."""
+"""`fig2mesh data`: errors are one line with exit code 2; help imports nothing heavy."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def test_refusals_are_one_line(
     Path("there").write_text("something else")
     arguments, message = REFUSED[case]
     assert main(arguments) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.startswith("fig2mesh: ")
-    assert said.err.count("\n") == 1
-    assert message in said.err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.startswith("fig2mesh: ")
+    assert printed.err.count("\n") == 1
+    assert message in printed.err
     assert [path.name for path in tmp_path.iterdir()] == ["there"]
     assert Path("there").read_text() == "something else"
 

@@ -15,7 +15,7 @@ from tests.exporters.analytic import ZURICH, asset, capsule
 
 @pytest.fixture
 def cesium_like(tmp_path: Path) -> Path:
-    """A folder that looks like CesiumJS from afar."""
+    """A folder with the layout of CesiumJS."""
     folder = tmp_path / "package" / "Build" / "Cesium"
     (folder / "Widgets").mkdir(parents=True)
     (folder / "Cesium.js").write_text("1;")
@@ -55,9 +55,9 @@ def test_a_folder_holds_all_that_the_page_needs(tmp_path: Path, farmer: Path, ce
     page = (out / "index.html").read_text(encoding="utf-8")
     assert '"url": "assets/1/tileset.json"' in page
     assert '"rectangle": [8.0, 47.0, 9.0, 48.0]' in page
-    assert [path.name for path in out.parent.iterdir()] == ["page"], "nothing is left beside it"
+    assert [path.name for path in out.parent.iterdir()] == ["page"], "nothing is left next to it"
 
-    # Again: only when told to, and only what is ours.
+    # Again: only with --overwrite, and only a page of fig2mesh.
     assert main(words) == 2
     (out / "assets" / "0" / "old.glb").write_text("x")
     assert main([*words, "--overwrite"]) == 0
@@ -82,7 +82,7 @@ def test_other_folders_are_left_alone(tmp_path: Path, farmer: Path, cesium_like:
         (["--overlay", "map.png", "8", "47"], "--overlay"),
     ],
 )
-def test_bad_input_is_told_in_one_line(
+def test_bad_input_is_reported_in_one_line(
     farmer: Path, cesium_like: Path, capsys: pytest.CaptureFixture[str], more: list[str], finding: str
 ) -> None:
     assert main(["globe", str(farmer), "--no-open", "--cesium", str(cesium_like), *more]) == 2
@@ -92,6 +92,6 @@ def test_bad_input_is_told_in_one_line(
     assert err.count("\n") == 1
 
 
-def test_assets_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_models_are_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["globe"]) == 2
     assert "MODEL" in capsys.readouterr().err

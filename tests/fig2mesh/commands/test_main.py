@@ -154,7 +154,7 @@ def test_missing_figure_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture
     assert message.count("\n") == 1
 
 
-def test_an_empty_picture_says_what_to_pass(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_error_for_an_empty_picture_names_the_options(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     Image.new("RGB", (60, 80), "white").save(tmp_path / "empty.png")
     assert main([str(tmp_path / "empty.png"), "-o", str(tmp_path / "a.glb")]) == 2
     message = capfd.readouterr().err
@@ -162,7 +162,7 @@ def test_an_empty_picture_says_what_to_pass(tmp_path: Path, capfd: pytest.Captur
     assert len(message.strip().splitlines()) == 1
 
 
-def test_faults_of_ours_are_not_the_users(
+def test_internal_errors_are_not_input_errors(
     files: DrawnFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def broken(*_: object, **__: object) -> None:
@@ -199,13 +199,15 @@ def test_profiles_of_the_help_are_those_of_the_writers() -> None:
     assert list(option.type.to_info_dict()["choices"]) == list(PROFILES)
 
 
-def test_a_missing_encoder_is_said_before_the_work(
+def test_a_missing_encoder_is_reported_before_the_work(
     files: DrawnFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "meshopt", None)
     assert main(arguments(files, "--profile", "cesiumjs", "-o", str(tmp_path / "a.glb"))) == 2
-    said = capfd.readouterr().err.strip()
-    assert said == ('fig2mesh: --profile: compression needs the package meshopt; pip install "fig2mesh[compression]"')
+    printed = capfd.readouterr().err.strip()
+    assert printed == (
+        'fig2mesh: --profile: compression needs the package meshopt; pip install "fig2mesh[compression]"'
+    )
     assert not (tmp_path / "a.glb").exists()
 
 

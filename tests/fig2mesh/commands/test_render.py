@@ -72,7 +72,7 @@ def test_depth_of_a_drawing_makes_no_texture(
     files: DrawnFiles, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: object, **__: object) -> None:
-        raise AssertionError("colours were looked for")
+        raise AssertionError("colours were looked up")
 
     monkeypatch.setattr("fig2mesh.stages.textures.make_sources", broken)
     monkeypatch.setattr("fig2mesh.stages.cloud.scan", broken)
@@ -120,7 +120,7 @@ SUN = ("--mode", "clay", "--effects", "sun,shadow", "--lonlat", "8.54", "47.38",
 
 
 def test_sun_goes_round_with_the_day(model: Path, tmp_path: Path) -> None:
-    """Who faces south has the morning on the left, which is the right of the picture."""
+    """A figure that faces south has the morning sun on its left, which is the right of the picture."""
     halves = []
     for hour in ("06", "18"):
         target = tmp_path / f"{hour}.png"
@@ -131,12 +131,12 @@ def test_sun_goes_round_with_the_day(model: Path, tmp_path: Path) -> None:
     assert halves[0] > 0 > halves[1]
 
 
-def test_night_is_said_in_one_line(model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_night_is_reported_in_one_line(model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     options = [*SUN, "--time", "2026-06-21T23:30Z", "-o", str(tmp_path / "a.png")]
     assert main(["render", str(model), *SMALL, *options]) == 0
-    said = capfd.readouterr().err
-    assert said.count("below the horizon") == 1
-    assert said.count("\n") == 2
+    printed = capfd.readouterr().err
+    assert printed.count("below the horizon") == 1
+    assert printed.count("\n") == 2
 
 
 BAD = {

@@ -99,7 +99,7 @@ def test_a_page_is_shown_until_interrupted(tmp_path: Path, monkeypatch: pytest.M
     assert b'id="figure"' in pages[0]
 
 
-def test_what_cannot_be_done_is_one_line(tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unusable_requests_are_one_line(tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     files = write_figure(tmp_path)
     figure = [str(files.image), "--keypoints", str(files.keypoints)]
     (tmp_path / "there.html").write_text("mine")
@@ -129,7 +129,7 @@ def test_what_cannot_be_done_is_one_line(tmp_path: Path, capsys: Output, monkeyp
     assert (tmp_path / "there.html").read_text() == "mine"
 
 
-def test_pages_are_replaced_when_told_so(tmp_path: Path) -> None:
+def test_pages_are_replaced_with_overwrite(tmp_path: Path) -> None:
     files, page = write_figure(tmp_path), tmp_path / "page.html"
     page.write_text("mine")
     options = ["--keypoints", str(files.keypoints), "--quality", "draft", "--parts", "outline", "-q", "-o", str(page)]

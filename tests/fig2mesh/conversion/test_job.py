@@ -33,7 +33,7 @@ def test_outputs_are_one_closed_solid(finished: Run, name: str) -> None:
     assert facts["volume_m3"] > 0
 
 
-def test_report_tells_what_was_made(finished: Run) -> None:
+def test_report_describes_the_model(finished: Run) -> None:
     measures = finished.report["measures"]
     assert measures["watertight"]
     assert measures["winding_consistent"]
@@ -60,7 +60,7 @@ def test_model_stands_on_the_ground_at_the_height_asked_for(finished: Run) -> No
 
 
 def test_left_is_at_plus_x_and_front_at_plus_z(finished: Run) -> None:
-    """The left hand wears a green glove: at +x, right as seen from the front, left as seen from behind."""
+    """The left hand wears a green glove: at +x, right in the front view, left in the back view."""
     mesh = load_textured(finished.output("a.glb"))
 
     def glove(yaw_deg: float) -> float:
@@ -71,7 +71,7 @@ def test_left_is_at_plus_x_and_front_at_plus_z(finished: Run) -> None:
 
     assert glove(0) > 0.7
     assert glove(180) < 0.3
-    assert 0.3 < glove(90) < 0.7, "seen from the figure's left the glove is in the middle"
+    assert 0.3 < glove(90) < 0.7, "from the figure's left the glove is in the middle"
 
 
 def test_measures_on_the_written_file_agree_with_the_report(finished: Run) -> None:
@@ -105,7 +105,7 @@ def test_without_textures_no_texture_network_runs(
     finished: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse() -> None:
-        raise AssertionError("a texture network was asked for")
+        raise AssertionError("a texture network was requested")
 
     monkeypatch.setattr("fig2mesh.texture.unobserved.shipped", refuse)
     arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--quality", "draft", "-q"]

@@ -74,7 +74,7 @@ class Sheet:
 
 @pytest.fixture(scope="module")
 def sheet(tmp_path_factory: pytest.TempPathFactory) -> Sheet:
-    """A paper-coloured sheet with a road and the drawn figure on it, and a .points file beside."""
+    """A paper-coloured sheet with a road and the drawn figure on it, and a .points file next to it."""
     folder = tmp_path_factory.mktemp("sheet")
     figure = draw_figure(SCALE)
     paper = Image.new("RGB", SHEET, (236, 226, 200))
@@ -88,8 +88,8 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> Sheet:
     own = keypoints(SCALE)
     (folder / "cut.json").write_text(json.dumps(own))
     moved = {
-        name: [x + CORNER[0], y + CORNER[1], seen]
-        for name, (x, y, seen) in dict(own["keypoints"]).items()  # type: ignore[call-overload]
+        name: [x + CORNER[0], y + CORNER[1], visible]
+        for name, (x, y, visible) in dict(own["keypoints"]).items()  # type: ignore[call-overload]
     }
     joints = {"width": SHEET[0], "height": SHEET[1], "keypoints": moved}
     (folder / "figure.json").write_text(json.dumps(joints))
@@ -119,9 +119,9 @@ def test_the_whole_road(sheet: Sheet, read: Figure, tmp_path: Path) -> None:
     placed = placement_of_tile(json.loads(tiles.read_text())["root"]["transform"])
     foot = foot_on_picture(read)
     there = lonlat(foot)[0]
-    apart = ecef_from_geodetic((*there, 0.0)) - ecef_from_geodetic((placed["lon_deg"], placed["lat_deg"], 0.0))
+    offset = ecef_from_geodetic((*there, 0.0)) - ecef_from_geodetic((placed["lon_deg"], placed["lat_deg"], 0.0))
     # The points are exact, the fit an affine one in the same grid: what is left is rounding.
-    assert np.linalg.norm(apart) < 1e-3
+    assert np.linalg.norm(offset) < 1e-3
     assert placed["height_m"] == pytest.approx(408 + 47.34, abs=0.01)
     # Towards the reader: down on the sheet, grid south turned by 20 degrees, with the grid's convergence.
     down = pyproj.Geod(ellps="WGS84").inv(*there, *lonlat(np.array(foot) + (0, 1))[0])[0] % 360
@@ -133,13 +133,13 @@ def test_the_whole_road(sheet: Sheet, read: Figure, tmp_path: Path) -> None:
     assert facts["placement"]["figure_height_m"] == pytest.approx(drawn_px * METRES_PX, rel=1e-3)
     # A hundredth of the height: the coarse mesh may stop short of the drawn tip.
     assert inspect(model)["size_m"][1] == pytest.approx(drawn_px * METRES_PX, rel=0.01)
-    said = facts["map"]
-    assert (said["sheet"], said["georeference"], said["method"]) == ("map.png", "map.points", "affine")
-    assert (said["control_points"], said["degrees_of_freedom"], said["inside_hull"]) == (7, 8, True)
-    assert said["rmse_m"] < 1e-3
-    assert len(said["residuals_m"]) == 7
-    assert said["pixel"] == pytest.approx(foot)
-    assert said["up_bearing_deg"] == pytest.approx(down - 180, abs=1e-3)
+    map_facts = facts["map"]
+    assert (map_facts["sheet"], map_facts["georeference"], map_facts["method"]) == ("map.png", "map.points", "affine")
+    assert (map_facts["control_points"], map_facts["degrees_of_freedom"], map_facts["inside_hull"]) == (7, 8, True)
+    assert map_facts["rmse_m"] < 1e-3
+    assert len(map_facts["residuals_m"]) == 7
+    assert map_facts["pixel"] == pytest.approx(foot)
+    assert map_facts["up_bearing_deg"] == pytest.approx(down - 180, abs=1e-3)
     stages = {stage["stage"]: stage["seconds"] for stage in facts["stages"]}
     assert "place" in stages
     kept = inspect(model)["metadata"]["map"]
@@ -147,7 +147,7 @@ def test_the_whole_road(sheet: Sheet, read: Figure, tmp_path: Path) -> None:
 
 
 def test_the_feet_are_where_the_asset_has_its_origin(sheet: Sheet, read: Figure) -> None:
-    """What is known before meshing and what the mesh makes of it: the same pixel, to a fraction."""
+    """The placement before meshing and that of the finished mesh agree to a fraction of a pixel."""
     from fig2mesh.field.body import Body
     from fig2mesh.mesh.isosurface import isosurface
     from fig2mesh.parts.canvas import make_canvas
@@ -175,7 +175,7 @@ def test_bbox_reduction_and_cutting_do_not_move_the_feet(sheet: Sheet, read: Fig
     assert height_on_picture(small) == pytest.approx(height_on_picture(read), abs=2 * small.step_px)
 
 
-def asked(sheet: Path | None, **more: Any) -> PlaceRequest:
+def place_request(sheet: Path | None, **more: Any) -> PlaceRequest:
     return PlaceRequest(
         **{
             "lonlat": None,
@@ -190,7 +190,7 @@ def asked(sheet: Path | None, **more: Any) -> PlaceRequest:
 
 
 def test_the_pixel_may_be_given(sheet: Sheet, read: Figure) -> None:
-    request = asked(sheet.folder / "map.points", at=(123.0, 456.0))
+    request = place_request(sheet.folder / "map.points", at=(123.0, 456.0))
     placed = place(request, open_map(request), read, sheet.figure)
     assert placed.placement is not None
     assert (placed.placement.lon_deg, placed.placement.lat_deg) == pytest.approx(tuple(lonlat((123, 456))[0]), abs=1e-9)
@@ -200,7 +200,7 @@ def test_the_pixel_may_be_given(sheet: Sheet, read: Figure) -> None:
 
 
 def test_other_facings_stay_bearings_of_the_compass(sheet: Sheet, read: Figure) -> None:
-    request = asked(sheet.picture, facing="NE")
+    request = place_request(sheet.picture, facing="NE")
     placed = place(request, open_map(request), read, sheet.picture).placement
     assert placed is not None
     assert placed.heading_deg == 45.0
@@ -208,14 +208,14 @@ def test_other_facings_stay_bearings_of_the_compass(sheet: Sheet, read: Figure) 
 
 def test_a_cut_out_figure_at_the_scale_of_the_sheet(sheet: Sheet) -> None:
     figure = read_figure(sheet.figure, keypoints=sheet.own_joints)
-    request = asked(sheet.picture, at=tuple(FOOT_PX), size_from="map")
+    request = place_request(sheet.picture, at=tuple(FOOT_PX), size_from="map")
     placed = place(request, open_map(request), figure, sheet.figure)
     assert "a pixel of cut.png is assumed to be as large as a pixel of the sheet" in placed.notes[-1]
     assert placed.height_m == pytest.approx(height_on_picture(figure) * METRES_PX, rel=1e-3)
 
 
-def test_outside_the_hull_is_told(sheet: Sheet, read: Figure, caplog: pytest.LogCaptureFixture) -> None:
-    request = asked(sheet.picture, at=(890.0, 10.0))
+def test_outside_the_hull_is_reported(sheet: Sheet, read: Figure, caplog: pytest.LogCaptureFixture) -> None:
+    request = place_request(sheet.picture, at=(890.0, 10.0))
     notes = place(request, open_map(request), read, sheet.picture).notes
     assert "outside the control points' hull" in notes[0]
 
@@ -226,7 +226,7 @@ def test_an_annotation_made_for_a_larger_scan(sheet: Sheet, read: Figure, tmp_pa
     picture = tmp_path / "map.png"
     picture.write_bytes(sheet.picture.read_bytes())
     (tmp_path / "map.json").write_text(json.dumps(made))
-    request = asked(picture)
+    request = place_request(picture)
     placed = place(request, open_map(request), read, picture).placement
     assert placed is not None
     assert (placed.lon_deg, placed.lat_deg) == pytest.approx(tuple(lonlat(foot_on_picture(read))[0]), abs=1e-7)
@@ -245,7 +245,7 @@ BAD = {
     "too few": (["--map", "map.png", "--map-transform", "poly3"], "7 control points, but poly3 needs 10"),
     "transform": (["--map", "map.png", "--map-transform", "magic"], "'magic' is not one of"),
     "altitude": (["--map", "map.png", "--altitude", "nan"], "--altitude"),
-    "facing": (["--map", "map.png", "--facing", "up"], "not a direction"),
+    "facing": (["--map", "map.png", "--facing", "up"], "is not a direction"),
     "clamp without place": (["--altitude-mode", "clamp"], "--altitude-mode: requires a place"),
     "clamp to a datum": (
         ["--map", "map.png", "--altitude-mode", "clamp", "--altitude-datum", "egm96"],
@@ -263,9 +263,9 @@ def test_bad_requests_are_one_line(
     monkeypatch.chdir(sheet.folder)
     target = tmp_path / "a.glb"
     assert run([*sheet.drawn, *options, *FAST, "-o", target]) == 2
-    said = capsys.readouterr().err
-    assert finding in said
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert finding in message
+    assert message.count("\n") == 1
     assert not target.exists()
 
 
@@ -281,15 +281,15 @@ def test_plan_takes_the_options_and_reads_nothing(sheet: Sheet, capsys: pytest.C
     assert "lift" in capsys.readouterr().out
 
 
-def test_formats_that_cannot_clamp_are_told() -> None:
-    request = asked(None, lonlat=(8.0, 47.0), altitude_mode="clamp")
+def test_formats_that_cannot_clamp_are_reported() -> None:
+    request = place_request(None, lonlat=(8.0, 47.0), altitude_mode="clamp")
     assert clamp_note(request, ("a.czml",)) is None
-    assert clamp_note(asked(None, lonlat=(8.0, 47.0)), ("a.glb",)) is None
-    said = clamp_note(request, ("a.czml", "a.glb", "tiles/tileset.json"))
-    assert said is not None
-    assert said.endswith("in a.glb, tiles/tileset.json")
+    assert clamp_note(place_request(None, lonlat=(8.0, 47.0)), ("a.glb",)) is None
+    note = clamp_note(request, ("a.czml", "a.glb", "tiles/tileset.json"))
+    assert note is not None
+    assert note.endswith("in a.glb, tiles/tileset.json")
 
 
 def test_options_of_a_place_alone_are_checked_before_the_figure(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be combined with --lonlat"):
-        open_map(asked(tmp_path / "map.png", lonlat=(8.0, 47.0)))
+        open_map(place_request(tmp_path / "map.png", lonlat=(8.0, 47.0)))

@@ -1,4 +1,4 @@
-"""What a request needs, told before it runs."""
+"""The plan of a request, before it runs."""
 
 from __future__ import annotations
 

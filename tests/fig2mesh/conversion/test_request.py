@@ -1,4 +1,4 @@
-"""Requests as values: what they accept, what they say of what they do not, and what is read from their fields."""
+"""Requests as values: accepted and rejected values, messages, and options derived from their fields."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def test_paths_may_be_texts_and_lists_tuples() -> None:
         ({"visible_from": -5}, "--visible-from: -5 m; give a positive distance in metres"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(values: dict[str, Any], message: str) -> None:
+def test_what_cannot_be_is_rejected_by_name(values: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError) as caught:
         Request("a.png", **values)
     assert str(caught.value) == message
 
 
 @pytest.mark.parametrize("kind", [Request, RenderRequest, ViewRequest, BatchRequest])
-def test_every_field_says_what_it_is_and_is_an_option(kind: type) -> None:
+def test_every_field_has_a_help_and_is_an_option(kind: type) -> None:
     command = click.command()(request_options(kind)(lambda request: None))
     text = CliRunner().invoke(command, ["--help"]).output
     for field in request_fields(kind):

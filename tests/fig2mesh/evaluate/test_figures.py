@@ -23,7 +23,7 @@ def cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip("|\n").split(" | ")]
 
 
-def test_one_figure_is_measured_and_the_other_says_what_it_lacks(
+def test_one_figure_is_measured_and_the_other_fails_with_a_reason(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_figure(tmp_path, name="fine")
@@ -32,9 +32,9 @@ def test_one_figure_is_measured_and_the_other_says_what_it_lacks(
     out = tmp_path / "made" / "table.md"
     arguments = ["evaluate", "figures", str(tmp_path), "--quality", "draft", "--parts", "outline", "-o", str(out)]
     assert main(arguments) == 1
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.splitlines() == ["1 of 2: fine", "2 of 2: joints missing"]
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert printed.err.splitlines() == ["1 of 2: fine", "2 of 2: joints missing"]
     header, _, fine, failed, median, worst = (cells(line) for line in out.read_text().splitlines())
     found = dict(zip(header, fine, strict=True))
     assert float(found["IoU %"]) > 97
@@ -50,7 +50,7 @@ def test_one_figure_is_measured_and_the_other_says_what_it_lacks(
     assert median[1:] == worst[1:] == fine[1:]
     # The answer is there now.
     assert main(arguments) == 2
-    assert "exists" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
 
 
 def test_folders_and_pairs_are_found(tmp_path: Path) -> None:
@@ -69,15 +69,15 @@ def test_folders_and_pairs_are_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["nowhere", "empty"])
-def test_a_folder_without_figures_is_refused_in_one_line(
+def test_a_folder_without_figures_is_rejected_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     (tmp_path / "empty").mkdir()
     assert main(["evaluate", "figures", str(tmp_path / name), "-o", str(tmp_path / "new" / "table.md")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("fig2mesh: ")
-    assert said.count("\n") == 1
-    assert name in said
+    printed = capsys.readouterr().err
+    assert printed.startswith("fig2mesh: ")
+    assert printed.count("\n") == 1
+    assert name in printed
     assert not (tmp_path / "new").exists()
 
 
@@ -95,9 +95,9 @@ def test_median_and_worst_are_over_what_was_made() -> None:
     table = as_markdown(rows)
     assert "c.png: broken \\| for good" in table
     assert "**no**" in table
-    told = json.loads(as_json(rows))
-    assert told["figures"]["c"] == {"failure": "c.png: broken | for good"}
-    assert told["worst"]["gap_share"] == 0.04
+    report = json.loads(as_json(rows))
+    assert report["figures"]["c"] == {"failure": "c.png: broken | for good"}
+    assert report["worst"]["gap_share"] == 0.04
 
 
 def test_nothing_made_has_no_median() -> None:

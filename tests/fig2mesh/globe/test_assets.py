@@ -1,4 +1,4 @@
-"""What a globe takes, which files it needs for that, and what it refuses."""
+"""Assets of a globe: accepted files, their dependencies, and rejected files."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("name", "content", "finding"), CASES)
-def test_what_is_refused(tmp_path: Path, name: str, content: str | None, finding: str) -> None:
+def test_what_is_rejected(tmp_path: Path, name: str, content: str | None, finding: str) -> None:
     if content is not None:
         (tmp_path / name).write_text(content)
     with pytest.raises(InputError, match=finding) as caught:
@@ -120,7 +120,7 @@ def test_what_is_refused(tmp_path: Path, name: str, content: str | None, finding
     assert "\n" not in str(caught.value)
 
 
-def test_a_model_without_a_place_is_refused(tmp_path: Path) -> None:
+def test_a_model_without_a_place_is_rejected(tmp_path: Path) -> None:
     write_glb(asset(lods=(capsule(6, 2),)), tmp_path / "nowhere.glb")
     with pytest.raises(InputError, match="--lonlat"):
         find_assets((tmp_path / "nowhere.glb",))

@@ -54,7 +54,7 @@ LEVEL = """(async () => {{
 
 
 def write_by_part(figure: Asset, path: Path) -> None:
-    """A file that says of each part how much of it the drawing showed, but not of each texel."""
+    """A file with the observed share of each part, but no mask of observed texels."""
     write_gltf(figure, path)
     document = json.loads(path.read_text())
     del document["extensions"]["EXT_structural_metadata"]["propertyTextures"]
@@ -143,7 +143,7 @@ def test_all_kinds_are_listed_with_place_and_credit(seen: dict[str, Any]) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "place"), [("tiles", ZURICH), ("model", EAST), ("entity", NORTH)])
-def test_the_camera_looks_at_the_nose_side_and_the_ground_is_level_with_the_feet(
+def test_the_camera_faces_the_front_and_the_ground_is_level_with_the_feet(
     seen: dict[str, Any], name: str, place: Any
 ) -> None:
     assert seen[name]["eye"] == pytest.approx(place.heading_deg, abs=0.5)
@@ -180,7 +180,7 @@ def test_observed_or_inferred_is_shown_by_parts(seen: dict[str, Any]) -> None:
 
 
 @pytest.mark.slow
-def test_levels_are_forced_and_say_what_they_are(seen: dict[str, Any]) -> None:
+def test_levels_are_forced_and_described(seen: dict[str, Any]) -> None:
     meshes = asset().lods
     for level in range(3):
         shown, text = seen[f"level {level}"]

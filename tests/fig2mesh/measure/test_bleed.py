@@ -42,7 +42,7 @@ def test_a_clean_model_has_none() -> None:
 
 @pytest.mark.parametrize(("width", "least", "most"), [(0.1, 0.99, 1.0), (0.0125, 0.3, 0.75)])
 def test_paper_on_the_rim_counts_as_far_as_it_reaches(width: float, least: float, most: float) -> None:
-    """Two pixels are looked at; a rim of one pixel is about half of them."""
+    """The examined rim is two pixels wide; a rim of one pixel is about half of it."""
     assert least <= share(textured(PAPER, width), *scan()) <= most
 
 
@@ -51,7 +51,7 @@ def test_ink_of_the_contour_is_the_figures_own() -> None:
     assert share(textured(INK, 0.05), rgba, mask) == 0
 
 
-def test_where_figure_and_paper_are_alike_nothing_can_be_told() -> None:
+def test_figure_and_paper_of_the_same_colour_do_not_count() -> None:
     assert share(textured(PAPER, 0.1, PAPER), *scan(PAPER, PAPER)) == 0
 
 

@@ -18,7 +18,7 @@ def model(*bodies: trimesh.Trimesh) -> TexturedMesh:
 
 
 def ball(radius: float, centre: tuple[float, float, float] = (0, 0, 0), halvings: int = 5) -> trimesh.Trimesh:
-    """halvings : of an icosahedron's edges; 3 (1,280 triangles) where topology is looked at and roundness is not"""
+    """halvings : of an icosahedron's edges; 3 (1,280 triangles) for tests of topology, not of roundness"""
     body = trimesh.creation.icosphere(halvings, radius)
     body.apply_translation(centre)
     return body
@@ -107,7 +107,7 @@ def test_a_cookie_cutter_is_wall_all_round() -> None:
 
 
 def test_a_half_round_body_has_half_a_wall() -> None:
-    # A cylinder along y that ends in flat discs: seen from the front its sides are round and its ends cut off.
+    # A cylinder along y that ends in flat discs: in the front view its sides are round and its ends flat.
     body = trimesh.creation.cylinder(0.1, 0.4, sections=256)
     body.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
     # Normals turn round the corners.

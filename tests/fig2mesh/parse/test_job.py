@@ -100,8 +100,8 @@ def test_given_files_are_kept(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "there": (["parse", "white.png", "-o", "there"], "mask.png: exists; pass --overwrite"),
-    "no folder": (["parse", "white.png", "-o", "white.png"], "is no folder"),
+    "there": (["parse", "white.png", "-o", "there"], "mask.png: already exists; use --overwrite"),
+    "no folder": (["parse", "white.png", "-o", "white.png"], "white.png: not a directory"),
     "no figure": (["parse", "white.png", "-o", "new"], "no figure found"),
     "no picture": (["parse", "none.png", "-o", "new"], "no such file"),
 }

@@ -96,7 +96,7 @@ def test_two_people_on_a_sheet_are_found_and_become_models(tmp_path: Path) -> No
 
 REFUSED = {
     "one figure": (["--all", "--bbox", "0", "0", "9", "9"], "--all: beside"),
-    "one": (["--smallest", "50"], "given without --all"),
+    "one": (["--smallest", "50"], "--smallest: requires --all"),
     "there": (["--all"], "figures.json: exists"),
 }
 

@@ -32,7 +32,7 @@ BODIES = {"pair": pair(), "harsh": harsh(), "mannequin": Body(analytic.mannequin
 
 
 def agree(frame: RenderedFrame, hits: Hits, least: float = 0.999) -> None:
-    """Frames reckon in float64 from the camera, rays are float32: a millionth of the distance apart."""
+    """Frames compute in float64 from the camera, rays are float32: they differ by a millionth of the distance."""
     assert frame.parts is not None
     assert frame.normals is not None
     depth, parts, normals = frame.depth.ravel(), frame.parts.ravel(), frame.normals.reshape(-1, 3)
@@ -126,7 +126,7 @@ def test_pixels_far_from_the_body_cost_nothing():
 
 
 def test_wrong_distances_cost_nothing():
-    """Only signs tell where rays may go: as many cells whether distances are right or a thousand times too large."""
+    """Only signs decide where rays may go: as many cells whether distances are right or a thousand times too large."""
     body = pair()
     stretched = Body(tuple(type(p)(p.part, p.grid * np.float32(1000), p.centre, p.edge) for p in body.parts))
     frames = [render_frame(b, looking(body, 30.0)) for b in (body, stretched)]

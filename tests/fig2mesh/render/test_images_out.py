@@ -95,7 +95,7 @@ def test_nothing_is_left_of_what_fails(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == []
 
 
-def test_suffixes_are_told_apart(tmp_path: Path) -> None:
+def test_suffixes_are_distinguished(tmp_path: Path) -> None:
     folder = tmp_path / "v1.2"
     folder.mkdir()
     assert [kind_of(path) for path in ("a.PNG", "a.webp", "turn", "turn.d/", str(folder))] == [
@@ -117,14 +117,14 @@ def test_mp4_without_ffmpeg_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.fixture
 def ffmpeg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A stand-in that keeps what it is sent and told."""
+    """A stand-in for ffmpeg that stores its input and arguments."""
     folder = tmp_path / "bin"
     folder.mkdir()
     program = folder / "ffmpeg"
-    program.write_text('#!/bin/sh\necho "$@" > "$(dirname "$0")/said"\nfor last; do :; done\ncat > "$last"\n')
+    program.write_text('#!/bin/sh\necho "$@" > "$(dirname "$0")/arguments"\nfor last; do :; done\ncat > "$last"\n')
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(folder), prepend=os.pathsep)
-    return folder / "said"
+    return folder / "arguments"
 
 
 def test_mp4_gets_every_picture_and_its_size(tmp_path: Path, ffmpeg: Path) -> None:

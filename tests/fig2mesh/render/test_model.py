@@ -26,7 +26,7 @@ def test_labels_of_parts_come_back(tmp_path: Path, name: str | None) -> None:
     assert np.array_equal(mesh.parts, split.parts)
 
 
-def test_compressed_models_are_refused_by_name(tmp_path: Path) -> None:
+def test_compressed_models_are_rejected_by_name(tmp_path: Path) -> None:
     write(asset(ZURICH), tmp_path / "a.glb", profile=PROFILES["cesiumjs"])
     with pytest.raises(ExportError, match=r"a\.glb: is compressed \(EXT_meshopt_compression\); give a file written"):
         read_model(tmp_path / "a.glb")

@@ -1,4 +1,4 @@
-"""What is asked for decides what is done: the pure function, and the counters that prove it."""
+"""Only requested work is done: the pure function, and the counters that prove it."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_textures_are_sampled_once_a_point_and_twice_where_they_blend(fields: Fi
     assert plain.texture_samples == plain.normals
     assert 0 < plain.sight_rays < plain.normals
     assert plain.normals < blended.texture_samples < 2 * plain.normals
-    # The normals of a mesh are not looked at for its texture.
+    # The texture of a mesh needs no normals.
     seen = spent(mesh, "normals").normals
     assert spent(mesh, "textured") == Counts(camera_rays=rays, texture_samples=seen)
 
@@ -97,7 +97,7 @@ def test_sun_below_the_horizon_casts_no_shadow_rays(fields: FieldScene) -> None:
         ("clay", "smooth-union", False, "drawing instead"),
     ],
 )
-def test_what_does_not_go_together_is_refused(mode: Mode, effects: str, fields: bool, expected: str) -> None:
+def test_what_does_not_go_together_is_rejected(mode: Mode, effects: str, fields: bool, expected: str) -> None:
     with pytest.raises(InputError, match=expected):
         check_effects(mode, parse_effects([effects]), fields=fields)
 

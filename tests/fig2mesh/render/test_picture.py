@@ -48,7 +48,7 @@ INK = (10, 20, 30)
 
 
 def ball_normals(request: PictureRequest, scene: FieldScene, radius: float) -> NDArray[np.float64]:
-    """(H, W, 3) normals of a ball about the origin in an orthographic picture; NaN beside it."""
+    """(H, W, 3) normals of a ball about the origin in an orthographic picture; NaN outside of it."""
     pixel = view_of(scene, request).camera.height / request.size[1]
     offset = (np.arange(SIDE) + 0.5 - SIDE / 2) * pixel / radius
     right, up = offset[None, :], -offset[:, None]
@@ -90,7 +90,7 @@ def test_light_is_added_linearly() -> None:
     assert np.allclose(255 * srgb_from_linear(linear_from_srgb(colours / 255)), colours, atol=1e-4)
 
 
-def test_shadow_of_a_ball_lies_where_geometry_says() -> None:
+def test_shadow_of_a_ball_lies_where_geometry_predicts() -> None:
     """Seen from straight above: a point of the ground is dark where a ray towards the sun meets the ball."""
     scene, radius = ball(0.2), 0.2
     sun = np.array([0.35, 0.9, 0.2])

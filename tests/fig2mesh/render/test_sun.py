@@ -1,4 +1,4 @@
-"""Where the sun stands, against published values and another library's, and from which side it lights a figure."""
+"""Position of the sun against published values and another library, and direction of its light on a figure."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ SPA = (
     (-58.4, -34.6, "2099-10-10T20:15:00+00:00", 276.4727, 21.5512),
     (139.7, 35.7, "2026-09-23T03:00:00+00:00", 191.1590, 53.7432),
 )
-"""Longitude, latitude, time, azimuth, elevation as seen through the air."""
+"""Longitude, latitude, time, azimuth, elevation with refraction."""
 
 
 @pytest.mark.parametrize(("lon", "lat", "time", "azimuth", "elevation"), SPA)
-def test_sun_stands_where_spa_says(lon: float, lat: float, time: str, azimuth: float, elevation: float) -> None:
+def test_sun_agrees_with_spa(lon: float, lat: float, time: str, azimuth: float, elevation: float) -> None:
     sun = sun_at(lon, lat, parse_time(time))
     # A fiftieth of the sun's own width.
     assert sun.azimuth_deg == pytest.approx(azimuth, abs=0.01)
@@ -52,7 +52,7 @@ def test_a_moment_is_one_in_any_zone() -> None:
     ("text", "expected"),
     [("noon", "ISO 8601"), ("2026-06-21T12:00", "zone"), ("2026-06-21", "zone"), ("0001-01-01T00:00+05:00", "range")],
 )
-def test_bad_times_are_refused(text: str, expected: str) -> None:
+def test_bad_times_are_rejected(text: str, expected: str) -> None:
     with pytest.raises(InputError, match=expected):
         parse_time(text)
 

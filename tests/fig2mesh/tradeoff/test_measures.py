@@ -26,7 +26,7 @@ def run(mesh: TexturedMesh | None) -> Run:
     return Run("voxel", "0.1", {"parts": 2.0, "solid": 1.0}, 100.0, mesh, failure="" if mesh else "too thin")
 
 
-def test_balls_are_as_far_apart_as_their_radii_tell() -> None:
+def test_distance_of_balls_is_the_difference_of_their_radii() -> None:
     found = measure(run(ball(1.01)), ball(1.0))
     assert found.chamfer_mm == pytest.approx(10, rel=0.02)
     assert found.hausdorff_mm == pytest.approx(10, rel=0.25)

@@ -40,7 +40,7 @@ def test_pictures_are_those_of_the_compiled_tracer(painted: Painted, page: Path,
         own_rgb = expected[..., :3] + 255 * (1 - expected[..., 3:])
         similarity = structural_similarity(page_rgb, own_rgb, channel_axis=2, data_range=255)
         assert similarity >= 0.95, (yaw, pitch, effects)
-        # Rays that graze: the texture's numbers have 16 bits, and what is thinner than a fifth of a node is not seen.
+        # Rays that graze: the texture's numbers have 16 bits, and anything thinner than a fifth of a node is invisible.
         differ = (image[..., 3] > 127) != (expected[..., 3] > 0.5)
         assert differ.sum() <= 0.002 * differ.size
         assert (share > 0).mean() > 0.05
@@ -120,7 +120,7 @@ def test_an_outline_runs_round_the_silhouette(page: Path, look: Look) -> None:
     inside = bare[..., 3] > 200
     border = np.pad(inside, 1)
     near = border[:-2, 1:-1] | border[2:, 1:-1] | border[1:-1, :-2] | border[1:-1, 2:]
-    # All pixels beside the silhouette are ink, and few others.
+    # All pixels next to the silhouette are ink, and few others.
     assert (added & near & ~inside).sum() >= 0.95 * (near & ~inside).sum()
     assert (lined[added][:, :3].max(axis=1) < 60).mean() > 0.99
 

@@ -1,4 +1,4 @@
-"""The figure as a billboard in CesiumJS: at its place, from the side that the camera sees."""
+"""The figure as a billboard in CesiumJS: at its place, from the direction of the camera."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ STAND = """new Promise((done) => {{
   }};
   wait();
 }})"""
-"""Stand at a bearing from the figure, 6 m away, and wait until the billboard shows what is to be seen from there."""
+"""Stand at a bearing from the figure, 6 m away, and wait until the billboard shows that view."""
 
 VIEWS = ((BEARING, 0), (BEARING - 90, 0), (BEARING + 180, 0), (BEARING + 40, 30), (BEARING, 0))
-"""Where the camera stands: bearing from the figure, pitch."""
+"""Positions of the camera: bearing from the figure, pitch."""
 
 
 def test_the_billboard_stands_at_its_place(painted: Painted, look: Look, cesium: Path) -> None:

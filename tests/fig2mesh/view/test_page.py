@@ -1,4 +1,4 @@
-"""What a page is made of: bricks, colour atlas, depth map, HTML."""
+"""Contents of a page: bricks, colour atlas, depth map, HTML."""
 
 from __future__ import annotations
 

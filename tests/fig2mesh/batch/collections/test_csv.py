@@ -131,7 +131,7 @@ def test_lines_after_a_quote_that_does_not_close_are_rows(path):
         ("figure\na.png\n".encode("utf-16-le"), "NUL character in the first line; give a text file, as CSV UTF-8"),
     ],
 )
-def test_files_that_are_no_table_are_refused_in_one_line(path, data, message):
+def test_files_that_are_not_tables_are_rejected_in_one_line(path, data, message):
     with pytest.raises(InputError) as refused:
         rows_of(path, data)
     assert str(refused.value) == f"{path}: {message}"

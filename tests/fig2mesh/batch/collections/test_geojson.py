@@ -226,7 +226,7 @@ def test_wgs_84_by_any_name_is_read(path, parser, crs):
     ],
 )
 @pytest.mark.parametrize("place", ["before", "after"])
-def test_other_reference_systems_are_refused_before_a_row_is_read(path, parser, crs, shown, place):
+def test_other_reference_systems_are_rejected_before_a_row_is_read(path, parser, crs, shown, place):
     text = f'"crs": {json.dumps(crs)},' if place == "before" else f', "crs": {json.dumps(crs)}'
     path.write_text(document(*[feature(POINT)] * 1_000, **{place: text}))
     with pytest.raises(InputError) as refused:
@@ -269,7 +269,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("text", BROKEN, ids=lambda text: repr(text[:30]))
-def test_files_that_are_no_geojson_are_refused_in_one_line(path, parser, text):
+def test_files_that_are_not_geojson_are_rejected_in_one_line(path, parser, text):
     with pytest.raises(InputError) as refused:
         rows_of(path, text)
     before, _, after = BROKEN[text].partition("*")

@@ -123,7 +123,7 @@ def test_a_system_known_by_its_text_alone_is_read(path):
     np.testing.assert_allclose([row.values["lon"], row.values["lat"]], [8, 47], atol=1e-12)
 
 
-def test_heights_with_a_datum_are_converted_or_refused(path):
+def test_heights_with_a_datum_are_converted_or_rejected(path):
     # Heights on the ellipsoid of another datum: a conversion without a grid. Above sea level there is none.
     write_layer(path, {"figure": texts("a.png", "b.png")}, [wkb(8.5, 47.25, 400.0), wkb(8.5, 47.25)], "EPSG:4937")
     found = read(path)
@@ -332,7 +332,7 @@ def test_names_of_files_are_only_names(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_other_databases_and_damaged_files_are_refused_in_one_line(path):
+def test_other_databases_and_damaged_files_are_rejected_in_one_line(path):
     with closing(sqlite3.connect(path)) as connection:
         connection.execute("CREATE TABLE figures (figure TEXT)")
     with pytest.raises(
@@ -357,7 +357,7 @@ def test_other_databases_and_damaged_files_are_refused_in_one_line(path):
         read(path)
 
 
-def test_columns_with_one_name_are_refused(path):
+def test_columns_with_one_name_are_rejected(path):
     write_layer(path, {"figure": texts("a.png"), "height-m": texts("1"), "height_m": texts("2")}, None)
     with pytest.raises(InputError, match="two columns named height_m; remove or rename one of them"):
         read(path)

@@ -1,4 +1,4 @@
-"""The same table gives the same rows, whatever file it is in; GDAL writes and reads beside us."""
+"""The same table gives the same rows, whatever the format of its file; GDAL is the reference reader and writer."""
 
 from __future__ import annotations
 
@@ -190,12 +190,12 @@ def test_damaged_files_are_rows_or_one_line(folder, data, file):
     path = folder / f"damaged-{file}"
     WRITERS[file](path, [FARMER] * 3)
     content = bytearray(path.read_bytes())
-    spots = st.integers(0, len(content) - 1)
+    places = st.integers(0, len(content) - 1)
     if file == "h.gpkg":
         # Most of the pages are empty.
-        spots = st.sampled_from([i for i, byte in enumerate(content) if byte])
-    for spot, new in data.draw(st.lists(st.tuples(spots, st.binary(min_size=1, max_size=3)), min_size=1, max_size=8)):
-        content[spot : spot + len(new)] = new
+        places = st.sampled_from([i for i, byte in enumerate(content) if byte])
+    for place, new in data.draw(st.lists(st.tuples(places, st.binary(min_size=1, max_size=3)), min_size=1, max_size=8)):
+        content[place : place + len(new)] = new
     path.write_bytes(content)
     check_outcome(path)
 
@@ -223,7 +223,7 @@ def check_outcome(path: Path) -> None:
         ("a.shp", b"\0\0\x27\x0a", "unknown suffix .shp; give a collection as CSV, GeoJSON or GeoPackage"),
     ],
 )
-def test_other_files_are_refused(tmp_path, file, data, message):
+def test_other_files_are_rejected(tmp_path, file, data, message):
     path = tmp_path / file
     path.write_bytes(data)
     with pytest.raises(InputError) as refused:
@@ -231,7 +231,7 @@ def test_other_files_are_refused(tmp_path, file, data, message):
     assert str(refused.value) == f"{path}: {message}"
 
 
-def test_missing_files_folders_and_layers_of_tables_are_refused(tmp_path):
+def test_missing_files_folders_and_layers_of_tables_are_rejected(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read(tmp_path / "a.csv")
     with pytest.raises(InputError, match="not a file"):
@@ -242,7 +242,7 @@ def test_missing_files_folders_and_layers_of_tables_are_refused(tmp_path):
         read(path, layer="b")
 
 
-def test_the_content_tells_kinds_with_other_suffixes(tmp_path):
+def test_the_content_decides_the_kind_of_other_suffixes(tmp_path):
     for file in ("h.gpkg", "e.geojson", "g.json"):
         path = tmp_path / file
         WRITERS[file](path, [FARMER])
@@ -250,7 +250,7 @@ def test_the_content_tells_kinds_with_other_suffixes(tmp_path):
         assert read(other)[0].values == FARMER
 
 
-def test_too_many_rows_are_refused(tmp_path, monkeypatch):
+def test_too_many_rows_are_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr(collection, "MAX_ROWS", 3)
     path = tmp_path / "a.csv"
     write_csv(path, [FARMER] * 3)
