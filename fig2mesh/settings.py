@@ -63,7 +63,7 @@ class Settings:
 
 
 EFFECTS = ("light", "none")
-"""Effects of the main job by name; `fig2mesh render` has more."""
+"""Effects of the main command by name; `fig2mesh render` has more."""
 
 PRESETS: dict[Quality, Settings] = {
     "draft": Settings(canvas_px=256, voxel=0.01, part_nodes=24, spacing=0.012, triangles=6_000, texture_size=512),

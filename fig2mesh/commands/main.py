@@ -50,7 +50,7 @@ GROUPS = {
 """Sections of the help, and the part of a request that each describes."""
 
 
-class MainJobGroup(click.Group):
+class MainCommandGroup(click.Group):
     """A group whose first argument may be a figure: then the main command runs."""
 
     def resolve_command(
@@ -91,7 +91,7 @@ class MainJobGroup(click.Group):
 
 
 @click.group(
-    cls=MainJobGroup,
+    cls=MainCommandGroup,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     invoke_without_command=False,
 )

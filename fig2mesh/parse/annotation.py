@@ -16,7 +16,7 @@ from fig2mesh.records import BoolArray, ByteArray, DepthOrder, Figure, FloatArra
 from fig2mesh.skeleton import JOINT_NAMES, LABEL_COLOURS, PART_NAMES
 
 KEYPOINTS, MASK, PART_LABELS = "keypoints.json", "mask.png", "part_labels.png"
-"""Names of the files in a folder of annotations; they are read by the main job's options of the same names."""
+"""Names of the files in a folder of annotations; they are read by the main command's options of the same names."""
 
 
 @dataclass(frozen=True)

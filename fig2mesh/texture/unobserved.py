@@ -51,7 +51,7 @@ def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: SideVi
 
 @dataclass(frozen=True)
 class TextureNets:
-    """Texture networks in the order of their use; the main job uses the first two only."""
+    """Texture networks in the order of their use; the main command uses the first two only."""
 
     uv: UvUnet
     fill: TextureFill

@@ -1,1 +1,1 @@
-"""Making data and weights: bodies, poses, garments, renders, one trainer per network. The main job needs none of it."""
+"""Making data and weights: bodies, poses, garments, renders, one trainer per network. The main command needs none of it."""

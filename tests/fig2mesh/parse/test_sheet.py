@@ -95,9 +95,9 @@ def test_two_people_on_a_sheet_are_found_and_become_models(tmp_path: Path) -> No
 
 
 REFUSED = {
-    "one figure": (["--all", "--bbox", "0", "0", "9", "9"], "--all: beside"),
+    "one figure": (["--all", "--bbox", "0", "0", "9", "9"], "--all: cannot be combined with"),
     "one": (["--smallest", "50"], "--smallest: requires --all"),
-    "there": (["--all"], "figures.json: exists"),
+    "there": (["--all"], "figures.json: already exists"),
 }
 
 
