@@ -40,7 +40,7 @@ def run(request: AnnotateRequest) -> None:
     def save(annotation: Annotation) -> str:
         whole = on_whole_picture(annotation, subject.corner, subject.size)
         write_annotation(folder, whole, subject.picture, overwrite=True)
-        log.info("%s", main_job(request.figure, folder, request.bbox))
+        log.info("%s", main_command(request.figure, folder, request.bbox))
         return f"saved in {folder}"
 
     def preview(annotation: Annotation) -> str:
@@ -64,7 +64,7 @@ def preview_page(subject: AnnotatedPicture, annotation: Annotation, parts: Parts
     return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, FIGURE_HEIGHT))
 
 
-def main_job(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:
+def main_command(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:
     """Command line that converts the saved annotation to a model."""
     words = ["fig2mesh", str(figure)]
     for option, name in (("--keypoints", KEYPOINTS), ("--mask", MASK), ("--part-labels", PART_LABELS)):

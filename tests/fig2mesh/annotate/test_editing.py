@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from fig2mesh.annotate.editing import STANDING, AnnotatedPicture, begin, packed, standing, unpacked
-from fig2mesh.annotate.job import main_job
+from fig2mesh.annotate.job import main_command
 from fig2mesh.annotate.server import HEADER, annotation_server
 from fig2mesh.errors import FigureError, InputError
 from fig2mesh.parse.annotation import Annotation, on_whole_picture, write_annotation
@@ -125,8 +125,8 @@ def test_a_bare_picture_can_be_begun_with(tmp_path: Path) -> None:
 
 
 def test_the_command_that_is_shown_names_the_files() -> None:
-    assert main_job(Path("a b.png"), Path("out"), (1, 2, 3, 4)).split(" --")[0] == "fig2mesh 'a b.png'"
-    assert "--bbox 1 2 3 4" in main_job(Path("a.png"), Path("out"), (1, 2, 3, 4))
+    assert main_command(Path("a b.png"), Path("out"), (1, 2, 3, 4)).split(" --")[0] == "fig2mesh 'a b.png'"
+    assert "--bbox 1 2 3 4" in main_command(Path("a.png"), Path("out"), (1, 2, 3, 4))
 
 
 @pytest.fixture
