@@ -39,6 +39,7 @@ def test_shipped_figures_become_valid_models(tmp_path: Path, name: str) -> None:
     assert len(np.unique(pixels // 32, axis=0)) > 20, "a picture of a coloured figure"
 
 
+@pytest.mark.slow
 def test_readme_commands_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")
