@@ -100,4 +100,4 @@ def test_python_examples_run(page: str, tmp_path: Path, monkeypatch: pytest.Monk
     names: dict[str, Any] = {"__name__": "__page__"}
     for number, block in enumerate(blocks, 1):
         exec(compile(block, f"{page}, block {number}", "exec"), names)
-    assert list(tmp_path.glob("*.glb"))
+    assert list(tmp_path.rglob("*.glb"))
