@@ -71,13 +71,6 @@ def request_of(values: Mapping[str, Value], defaults: Mapping[str, Any], name: s
         raise InputError(_column_of(error.source), error.finding, error.remedy) from None
 
 
-def list_of(value: Any) -> tuple[str, ...]:
-    """Items of a list, or of a text separated by spaces, commas or semicolons."""
-    if isinstance(value, tuple | list):
-        return tuple(map(str, value))
-    return tuple(str(value).replace(",", " ").replace(";", " ").split())
-
-
 def attributes_of(values: Mapping[str, Value]) -> dict[str, Value]:
     """Values of a row that are not options."""
     return {column: value for column, value in values.items() if not (is_known(column) or column in _refused())}

@@ -12,10 +12,10 @@ from typing import Any, Final
 
 from exporters.tiles.tileset import safe_name
 from fig2mesh.batch.collections.rows import Row
-from fig2mesh.batch.columns import attributes_of, list_of, request_of
+from fig2mesh.batch.columns import attributes_of, request_of
 from fig2mesh.batch.row_files import FILE_FIELDS
 from fig2mesh.batch.task import Problem, RowTask
-from fig2mesh.conversion.fields import as_plain
+from fig2mesh.conversion.fields import as_plain, list_of
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
@@ -82,7 +82,7 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
 def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], problem: Problem | None = None) -> RowTask:
     """Task of a row; problem : one that has already been found."""
     values = row.values
-    formats = list_of(values.get("format", defaults.get("format", ())))
+    formats = tuple(list_of(values.get("format", defaults.get("format", ()))))
     date = values.get("date", defaults.get("date"))
     request = None
     if problem is None:

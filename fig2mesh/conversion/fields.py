@@ -204,7 +204,7 @@ def parse_value(field: RequestField, raw: object, source: str) -> Any:
     Raises InputError.
     """
     if field.type.many or field.type.count > 1:
-        items = _listed(raw)
+        items = list_of(raw)
         if field.type.count > 1 and len(items) != field.type.count:
             raise InputError(source, f"{len(items)} values", f"give {field.type.count}: {field.option.metavar}")
         return tuple(_parse_item(field, item, source) for item in items)
@@ -226,7 +226,8 @@ def _parse_item(field: RequestField, raw: object, source: str) -> Any:
         raise InputError(source, f"{text[:40]!r} is not {name}", f"give {name}") from None
 
 
-def _listed(raw: object) -> list[str]:
+def list_of(raw: object) -> list[str]:
+    """Items of a list, or of a text in which spaces, commas or semicolons separate them."""
     if isinstance(raw, tuple | list):
         return [_text(item) for item in raw]
     return _text(raw).replace(",", " ").replace(";", " ").split()

@@ -48,7 +48,7 @@ class Inputs:
 class Results:
     """Results of stages: `results[lift]` is what the stage function `lift` returned, with its type.
 
-    keys : key of each result; empty where there is no store
+    keys : key of each result; empty unless the store goes by keys
     """
 
     values: Mapping[str, object]
@@ -84,7 +84,7 @@ class Runner:
 
         Stages whose results the store holds are not run, nor are those that only they need.
         """
-        keys = {} if isinstance(self.store, NoStore) else self.keys(inputs)
+        keys = self.keys(inputs) if self.store.keyed else {}
         results = inputs.values()
         wanted = {goal.__name__ for goal in goals}
         not_run: dict[str, str] = {}

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from fig2mesh.conversion.record_file import read_record, write_record
 from fig2mesh.errors import FigureError, InputError, OutputError
@@ -22,7 +22,9 @@ T = TypeVar("T")
 
 
 class Store(Protocol):
-    """Storage of stage results."""
+    """Where results of stages are kept; keyed : whether it goes by keys, which cost a digest of code and figure."""
+
+    keyed: ClassVar[bool]
 
     def load(self, stage: Stage, key: str) -> object | None:
         """The result kept for a stage, or None."""
@@ -33,6 +35,8 @@ class Store(Protocol):
 
 class NoStore:
     """Store that keeps nothing."""
+
+    keyed: ClassVar[bool] = False
 
     def load(self, stage: Stage, key: str) -> None:
         return None
@@ -45,6 +49,7 @@ class NoStore:
 class MemoryStore:
     """Store in memory; a change of settings or figure changes the keys of all results that depend on it."""
 
+    keyed: ClassVar[bool] = True
     results: dict[str, object] = field(default_factory=dict)
 
     def load(self, stage: Stage, key: str) -> object | None:
@@ -61,6 +66,7 @@ class FolderStore:
     read : names of the stages whose files are used; the others are run again, and written
     """
 
+    keyed: ClassVar[bool] = False
     folder: Path
     read: frozenset[str] = frozenset()
 
@@ -103,6 +109,7 @@ class KeyedStore:
     fresh : read nothing, store everything; made, reused : names of results that were made, and that were read
     """
 
+    keyed: ClassVar[bool] = True
     folder: Path
     fresh: bool = False
     made: list[str] = field(default_factory=list)
