@@ -7,7 +7,7 @@ feet. Records are frozen and their arrays read-only, so that a writer cannot cha
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -63,6 +63,39 @@ class Texture:
 
 
 @dataclass(frozen=True)
+class OutlineMesh:
+    """The drawn contour as a mesh beside the solid.
+
+    vertices : (N, 3) float32, ASSET, metres
+    faces : (M, 3) int32
+    colors : (N, 3) uint8 sRGB, of the pen
+    culled : True: an inverted hull, closed, whose faces point inwards and are to be shown from their front only (a
+        client that does not cull back faces shows the whole figure in the pen's colour); False: a ribbon along the
+        silhouette, visible from both sides
+    surface : (S, 3) float32, ASSET, metres: the vertices of the unsplit solid before they were inset
+    width_m : median width of the line, metres
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    colors: ByteArray
+    culled: bool
+    surface: FloatArray
+    width_m: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertices", frozen_array(self.vertices, np.float32, (None, 3), "vertices"))
+        object.__setattr__(self, "faces", frozen_array(self.faces, np.int32, (None, 3), "faces"))
+        count = len(self.vertices)
+        object.__setattr__(self, "colors", frozen_array(self.colors, np.uint8, (count, 3), "colors"))
+        object.__setattr__(self, "surface", frozen_array(self.surface, np.float32, (None, 3), "surface"))
+        if not len(self.faces):
+            raise ValueError("faces: empty; a mesh without a contour has no outline")
+        if self.faces.min() < 0 or self.faces.max() >= count:
+            raise ValueError(f"faces: index {int(self.faces.max())} outside the {count} vertices")
+
+
+@dataclass(frozen=True)
 class TexturedMesh:
     """A closed triangle mesh whose vertices are split along texture seams.
 
@@ -77,6 +110,7 @@ class TexturedMesh:
     solid_index : (V,) int32, the vertex of the unsplit solid for each vertex: faces mapped through it
         form a closed, oriented, manifold surface
     deviation_m : measured mean and maximum distance to the surface before simplification, metres
+    outline : the drawn contour; `vertices` are then inset by its width. None: `vertices` are the surface as drawn
     """
 
     vertices: FloatArray
@@ -89,6 +123,7 @@ class TexturedMesh:
     colors: ByteArray | None = None
     parts: ByteArray | None = None
     deviation_m: tuple[float, float] = (0.0, 0.0)
+    outline: OutlineMesh | None = None
 
     def __post_init__(self) -> None:
         def freeze(name: str, dtype: Any, shape: tuple[int | None, ...]) -> None:
@@ -108,6 +143,8 @@ class TexturedMesh:
             raise ValueError(f"faces: index {int(self.faces.max())} outside the {count} vertices")
         if self.texture is not None and self.uv is None:
             raise ValueError("texture: given without uv coordinates")
+        if self.outline is not None and self.solid_index.max(initial=-1) >= len(self.outline.surface):
+            raise ValueError(f"outline: its surface has only {len(self.outline.surface)} vertices")
 
     @property
     def shading_normals(self) -> FloatArray:
@@ -126,6 +163,16 @@ class TexturedMesh:
     def solid_faces(self) -> IntArray:
         """(F, 3) int32 faces of the unsplit solid."""
         return self.solid_index[self.faces]
+
+
+def without_outline(mesh: TexturedMesh) -> TexturedMesh:
+    """Return the mesh without its outline and with the surface as drawn, not inset; the mesh itself if it has none.
+
+    For formats and levels of detail without outlines, and for measures of the solid.
+    """
+    if mesh.outline is None:
+        return mesh
+    return replace(mesh, vertices=mesh.outline.surface[mesh.solid_index], outline=None)
 
 
 @dataclass(frozen=True)
