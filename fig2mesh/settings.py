@@ -11,7 +11,7 @@ Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
 Precision = Literal["float32", "bfloat16"]
 Textures = Literal["network", "plain", "none"]
-Contours = Literal["keep", "drop"]
+Contours = Literal["hull", "keep", "drop"]
 
 
 @dataclass(frozen=True)

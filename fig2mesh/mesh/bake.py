@@ -23,6 +23,10 @@ from fig2mesh.texture.sources import Sources
 TURNED = -0.3
 """Threshold of the z of a triangle's normal, below which it is not visible whatever its smooth normal."""
 
+SLANT, SLANT_SOFT = 0.3, 0.1
+"""Threshold of the normal's z, below which a contour would be drawn out to three times its width and more, and its
+softness."""
+
 LINE_REACH = 0.8
 """Distance off the surface at which corners are detected, widths of the line."""
 
@@ -51,6 +55,8 @@ def bake(
     frame: ImageFrame,
     size: int,
     body: Body | None = None,
+    inset: FloatArray | None = None,
+    bare: FloatArray | None = None,
 ) -> Baked:
     """Bake the atlas of a mesh in FIGURE.
 
@@ -60,6 +66,8 @@ def bake(
     face_parts : (F,) uint8 part label of every triangle
     size : texels along each side of the square texture
     body : its creases are inked where the drawing has contours; None: no ink
+    inset : (V, 3) vertices of the surface that is shown, where it is not `mesh.solid`
+    bare : (H, W, 3) the drawing without the line along its rim, for points that it shows at a slant; None: as drawn
     """
     owner, weights = rasterise(mesh.uv, mesh.faces, size)
     covered = owner >= 0
@@ -68,9 +76,16 @@ def bake(
     points = np.einsum("nk,nkd->nd", weights[covered], corners[face])
     normal = np.einsum("nk,nkd->nd", weights[covered], normals[mesh.solid.faces][face].astype(np.float64))
     count("texels", len(face))
-    visible = _visible(mesh.solid, face, points, normal, sources.grazing)
+    solid, shown = mesh.solid, points
+    if inset is not None:
+        solid = Mesh(inset, mesh.solid.faces)
+        shown = np.einsum("nk,nkd->nd", weights[covered], inset[solid.faces].astype(np.float64)[face])
+    visible = _visible(solid, face, shown, normal, sources.grazing)
     color = np.empty((len(face), 3))
-    color[visible] = drawn_colours(sources, frame, points[visible])
+    color[visible] = drawn_colours(sources, frame, shown[visible])
+    if bare is not None:
+        share = slant(normal[visible, 2])[:, None]
+        color[visible] += share * (_bilinear(bare, frame.image_from_figure(shown[visible])) - color[visible])
     hidden = ~visible
     color[hidden] = plain_colours(sources, frame, points[hidden], normal[hidden], face_parts[face[hidden]], body)
     image = np.zeros((size, size, 3), np.uint8)
@@ -80,6 +95,11 @@ def bake(
     # Padding: bilinear filtering and mipmaps reach beyond the charts.
     _, source = ndimage.distance_transform_edt(~covered, return_indices=True)
     return Baked(image[tuple(source)], observed[tuple(source)], covered)
+
+
+def slant(z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N,) share of the colour beside the contour at points with that z of their unit normals: 1 at a slant, else 0."""
+    return np.clip((SLANT - z) / SLANT_SOFT + 0.5, 0.0, 1.0)
 
 
 def drawn_faces(mesh: Mesh) -> NDArray[np.bool_]:
@@ -122,19 +142,25 @@ def _visible(
 
     grazing : least z of the smooth normal
     """
-    import open3d as o3d
-
     vertices, faces = mesh.vertices, mesh.faces
     a, b, c = (vertices[faces[:, i]].astype(np.float64) for i in range(3))
     flat = np.cross(b - a, c - a)
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-20)
     visible = (smooth[:, 2] > grazing) & (flat[face, 2] > TURNED)
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(o3d.core.Tensor.from_numpy(vertices), o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
-    start = points[visible] + CLEARANCE * flat[face[visible]]
-    rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
-    visible[visible] = ~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
+    visible[visible] = visible_points(mesh, points[visible], flat[face[visible]])
     return np.asarray(visible)
+
+
+def visible_points(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(N,) bool: points of a surface with nothing between them and the viewer of the drawing; normals : (N, 3) unit."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    corners = o3d.core.Tensor.from_numpy(np.array(mesh.vertices))
+    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)))
+    start = points + CLEARANCE * normals
+    rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
+    return np.asarray(~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy())
 
 
 def drawn_colours(sources: Sources, frame: ImageFrame, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,10 +28,11 @@ MIN_WIDTH: Final = 0.1
 
 @dataclass(frozen=True)
 class ContourMesh:
-    """mesh : FIGURE; colors : (V, 3) uint8 sRGB."""
+    """mesh : FIGURE; colors : (V, 3) uint8 sRGB; culled : an inverted hull, of which clients must draw front sides only."""
 
     mesh: Mesh
     colors: NDArray[np.uint8]
+    culled: bool
 
 
 def ribbon(rim: Rim, width: Floats, color: Floats) -> ContourMesh | None:
@@ -58,12 +59,12 @@ def ribbon(rim: Rim, width: Floats, color: Floats) -> ContourMesh | None:
     )
     faces = np.concatenate([front, front[:, ::-1]])
     mesh = Mesh(np.concatenate([outer, inner]).astype(np.float32), faces.astype(np.int32))
-    return ContourMesh(mesh, np.tile(_bytes(color[used]), (2, 1)))
+    return ContourMesh(mesh, np.tile(_bytes(color[used]), (2, 1)), culled=False)
 
 
 def hull(mesh: Mesh, color: Floats) -> ContourMesh:
     """Inverted hull; mesh : the surface before it was inset; color : (V, 3) sRGB 0-255."""
-    return ContourMesh(Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1])), _bytes(color))
+    return ContourMesh(Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1])), _bytes(color), culled=True)
 
 
 def _bytes(color: Floats) -> NDArray[np.uint8]:

@@ -8,6 +8,7 @@ from fig2mesh.field.body import Body
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.bake import Baked
 from fig2mesh.mesh.bake import bake as bake_mesh
+from fig2mesh.mesh.contour import Contour
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.records import Figure, UvMesh
 from fig2mesh.stages.unwrap import texels_of_level
@@ -15,7 +16,13 @@ from fig2mesh.texture.sources import Sources
 
 
 def bake(
-    figure: Figure, textures: Sources, body: Body, unwrap: tuple[UvMesh, ...], *, texture_size: int
+    figure: Figure,
+    textures: Sources,
+    body: Body,
+    unwrap: tuple[UvMesh, ...],
+    contour: Contour,
+    *,
+    texture_size: int,
 ) -> tuple[Baked, ...]:
     """Colour of each texel, and its observed mask."""
     frame = image_frame(figure)
@@ -28,6 +35,8 @@ def bake(
             frame,
             texels_of_level(texture_size, level),
             body,
+            inset=contour.levels[level].vertices,
+            bare=contour.bare,
         )
         for level, mesh in enumerate(unwrap)
     )

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from exporters.asset import Texture, TexturedMesh
+from exporters.asset import OutlineMesh, Texture, TexturedMesh
 from fig2mesh.asset_frame import asset_from_figure
 from fig2mesh.mesh.bake import Baked
-from fig2mesh.records import Mesh, Pose3D, Surface, UvMesh
+from fig2mesh.mesh.contour import Contour, ContourLevel
+from fig2mesh.records import FloatArray, Mesh, Pose3D, Surface, UvMesh
+from georef.transform import Transform
 
 
 def model(
@@ -18,6 +20,7 @@ def model(
     simplify: tuple[Mesh, ...],
     unwrap: tuple[UvMesh, ...] | None,
     bake: tuple[Baked, ...] | None,
+    contour: Contour | None,
     height_m: float,
 ) -> tuple[TexturedMesh, ...]:
     """Meshes in ASSET, finest first.
@@ -25,13 +28,14 @@ def model(
     unwrap, bake : None where no texture is requested
     height_m : height of the drawn figure, metres
     """
-    if unwrap is None or bake is None:
+    if unwrap is None or bake is None or contour is None:
         return _levels(lift, surface, simplify, height_m)
-    bare = _levels(lift, surface, tuple(mesh.solid for mesh in unwrap), height_m)
+    asset = asset_from_figure(lift, simplify[0].vertices, height_m)
+    bare = _levels(lift, surface, simplify, height_m)
     return tuple(
         replace(
             level,
-            vertices=level.vertices[mesh.solid_index],
+            vertices=asset.apply(inset.vertices).astype(np.float32)[mesh.solid_index],
             faces=mesh.faces,
             normals=None if level.normals is None else level.normals[mesh.solid_index],
             solid_index=mesh.solid_index,
@@ -39,8 +43,22 @@ def model(
             texture=Texture(texture.color),
             observed=Texture(texture.observed[..., None]),
             parts=None if level.parts is None else level.parts[mesh.solid_index],
+            outline=_outline(contour, inset, asset, level.vertices),
         )
-        for level, mesh, texture in zip(bare, unwrap, bake, strict=True)
+        for level, mesh, texture, inset in zip(bare, unwrap, bake, contour.levels, strict=True)
+    )
+
+
+def _outline(contour: Contour, level: ContourLevel, asset: Transform, surface: FloatArray) -> OutlineMesh | None:
+    if level.line is None:
+        return None
+    return OutlineMesh(
+        vertices=asset.apply(level.line.mesh.vertices).astype(np.float32),
+        faces=level.line.mesh.faces,
+        colors=level.line.colors,
+        culled=level.line.culled,
+        surface=surface,
+        width_m=float(asset.matrix[0, 0]) * contour.width,
     )
 
 

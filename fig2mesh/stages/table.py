@@ -8,6 +8,7 @@ from fig2mesh.settings import Settings
 from fig2mesh.stages.bake import bake
 from fig2mesh.stages.body import body
 from fig2mesh.stages.cloud import cloud
+from fig2mesh.stages.contour import contour
 from fig2mesh.stages.lift import lift
 from fig2mesh.stages.model import model
 from fig2mesh.stages.parts import parts
@@ -38,6 +39,11 @@ def _textures(settings: Settings) -> str:
     return "colours of hidden sides, " + ("by two networks" if inferred else "those in front of them")
 
 
+def _contour(settings: Settings) -> str:
+    forms = {"hull": "an inverted hull", "keep": "a ribbon along the silhouette", "drop": "left off"}
+    return f"the drawn contour, {forms[settings.contours]}"
+
+
 NO_POINTS: Final = Unless("mesher", "isosurface", "the isosurface needs no points")
 NO_TEXTURE: Final = Unless("textures", "none", "no texture is requested")
 
@@ -50,6 +56,7 @@ STAGES: Final[tuple[Stage, ...]] = (
     Stage(simplify, _simplify),
     Stage(surface, lambda settings: "normals, parts and deviation of the simplified mesh"),
     Stage(unwrap, lambda settings: "texture coordinates", unless=NO_TEXTURE),
+    Stage(contour, _contour, unless=NO_TEXTURE),
     Stage(textures, _textures, Kept.NEVER, NO_TEXTURE),
     Stage(bake, lambda settings: f"a texture of {settings.texture_size} texels per side", unless=NO_TEXTURE),
     Stage(model, lambda settings: "metres, on the ground", Kept.NEVER),
