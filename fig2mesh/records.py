@@ -228,6 +228,7 @@ class UvMesh(_Checked):
     solid_index : (V,) int32, vertex of `solid` for each split vertex
     uv : (V, 2) float32 in [0, 1], v = 0 at image row 0
     atlas_size : (width, height) in texels the atlas was packed for
+    line_uv : (L, 2) float32, the same of the vertices of a ribbon that shows the drawn contour; None: there is none
     """
 
     solid: Mesh
@@ -235,11 +236,14 @@ class UvMesh(_Checked):
     solid_index: IntArray
     uv: FloatArray
     atlas_size: tuple[int, int]
+    line_uv: FloatArray | None = None
 
     def __post_init__(self) -> None:
         self._put("faces", np.int32, (len(self.solid.faces), 3))
         self._put("solid_index", np.int32, (None,))
         self._put("uv", np.float32, (len(self.solid_index), 2))
+        if self.line_uv is not None:
+            self._put("line_uv", np.float32, (None, 2))
         for name, count in (("faces", len(self.solid_index)), ("solid_index", len(self.solid.vertices))):
             indices = getattr(self, name)
             if indices.size and (indices.min() < 0 or indices.max() >= count):

@@ -57,6 +57,7 @@ def bake(
     body: Body | None = None,
     inset: FloatArray | None = None,
     bare: FloatArray | None = None,
+    ribbon: Mesh | None = None,
 ) -> Baked:
     """Bake the atlas of a mesh in FIGURE.
 
@@ -67,6 +68,7 @@ def bake(
     size : texels along each side of the square texture
     body : its creases are inked where the drawing has contours; None: no ink
     inset : (V, 3) vertices of the surface that is shown, where it is not `mesh.solid`
+    ribbon : shows the drawing's contour, at the texture coordinates `mesh.line_uv`; None: there is none
     bare : (H, W, 3) the drawing without the line along its rim, for points that it shows at a slant; None: as drawn
     """
     owner, weights = rasterise(mesh.uv, mesh.faces, size)
@@ -92,6 +94,14 @@ def bake(
     image[covered] = np.clip(np.round(color), 0, 255).astype(np.uint8)
     observed = np.zeros((size, size), np.uint8)
     observed[covered] = np.where(visible, 255, 0)
+    if ribbon is not None and mesh.line_uv is not None:
+        owner, weights = rasterise(mesh.line_uv, ribbon.faces, size)
+        line = (owner >= 0) & ~covered
+        corners = ribbon.vertices[ribbon.faces[owner[line]]].astype(np.float64)
+        drawn = drawn_colours(sources, frame, np.einsum("nk,nkd->nd", weights[line], corners))
+        image[line] = np.clip(np.round(drawn), 0, 255).astype(np.uint8)
+        observed[line] = 255
+        covered |= line
     # Padding: bilinear filtering and mipmaps reach beyond the charts.
     _, source = ndimage.distance_transform_edt(~covered, return_indices=True)
     return Baked(image[tuple(source)], observed[tuple(source)], covered)

@@ -17,8 +17,16 @@ from fig2mesh.mesh.rim import Rim, rim_of
 from fig2mesh.records import Figure, FloatArray, Mesh
 from fig2mesh.settings import Contours
 from fig2mesh.texture.bare import without_line
-from fig2mesh.texture.contour import DrawnLine, drawn_line
+from fig2mesh.texture.contour import drawn_line
 from fig2mesh.texture.sources import continued
+
+Floats = NDArray[np.float64]
+
+WIDER, SOFT_PX = 1.1, 0.75
+"""Width of the ribbon relative to the line's, and what is added for its soft edge, pixels."""
+
+MIN_TAKEN = 0.6
+"""Least share of a line's width by which the surface is inset for the line to be taken off it: the rest would show."""
 
 
 @dataclass(frozen=True)
@@ -57,34 +65,46 @@ def contour_of(
     """
     picture = continued(figure.rgba, figure.mask)
     levels, width, bare = [], 0.0, None
-    for number, mesh in enumerate(meshes):
+    for mesh in meshes:
         normals = vertex_normals(mesh, body)
         rim = rim_of(mesh, normals)
-        line = drawn_line(picture, frame, rim.points, rim.outwards, _shown(mesh, rim))
+        shown = _unobstructed(mesh, rim, rim.points)
+        line = drawn_line(picture, frame, rim.points, rim.outwards, shown)
         drawn = line.width > 0
-        if number == 0 and drawn.any():
-            width = float(np.median(line.width[drawn]))
-            bare = without_line(picture, figure.mask, frame, rim.points, line)
-        if contours == "drop" or not drawn.any():
+        if not drawn.any():
             levels.append(ContourLevel(mesh.vertices, None))
+            continue
+        readings = steady(rim, line.width)
+        if contours == "keep":
+            # A ribbon shows the drawing itself, soft edges and what is beside them included.
+            readings = np.where(readings > 0, WIDER * readings + SOFT_PX * frame.units_per_px, readings)
+        widths = np.maximum(continued_over(mesh, rim, readings[:, None])[:, 0], 0.0)
+        colors = continued_over(mesh, rim, np.where(drawn[:, None], line.color, np.nan))
+        moved = inset(mesh, normals, widths)
+        # Thin things are inset by less than the line's width, and the rest of the line stays on the surface.
+        taken = rim.at(np.linalg.norm(mesh.vertices - moved, axis=1))
+        stands = _standing(mesh, rim, line.width, taken)
+        if bare is None:
+            width = float(np.median(line.width[drawn]))
+            off = shown & (stands >= MIN_TAKEN * rim.at(widths))
+            bare = without_line(picture, figure.mask, frame, rim.points[off], stands[off], rim.at(colors)[off])
+        if contours == "drop":
+            levels.append(ContourLevel(mesh.vertices, None))
+        elif contours == "hull":
+            levels.append(ContourLevel(moved, hull(mesh, colors)))
         else:
-            levels.append(_level(mesh, normals, rim, line, contours))
+            levels.append(ContourLevel(moved, ribbon(rim, stands, rim.at(colors))))
     return Contour(tuple(levels), width, bare)
 
 
-def _level(mesh: Mesh, normals: FloatArray, rim: Rim, line: DrawnLine, contours: Contours) -> ContourLevel:
-    readings = np.concatenate([steady(rim, line.width)[:, None]], axis=1)
-    widths = np.maximum(continued_over(mesh, rim, readings)[:, 0], 0.0)
-    pens = np.where((line.width > 0)[:, None], line.color, np.nan)
-    colors = continued_over(mesh, rim, pens)
-    moved = inset(mesh, normals, widths)
-    if contours == "hull":
-        return ContourLevel(moved, hull(mesh, colors))
-    # The ribbon ends where the surface begins, however far that could be inset.
-    depth = np.linalg.norm(mesh.vertices - moved, axis=1)
-    return ContourLevel(moved, ribbon(rim, rim.at(depth), rim.at(colors)))
+def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats) -> Floats:
+    """(N,) width of the ribbon: none where it would be seen from the front and nothing is drawn."""
+    middle = rim.points.copy()
+    middle[:, :2] -= 0.5 * taken[:, None] * rim.outwards
+    bare = ~(steady(rim, drawn) > 0) & _unobstructed(mesh, rim, middle)
+    return np.where(bare, 0.0, taken)
 
 
-def _shown(mesh: Mesh, rim: Rim) -> NDArray[np.bool_]:
-    """(N,) bool: points of the rim with nothing in front of them."""
-    return visible_points(mesh, rim.points, np.append(rim.outwards, np.zeros((len(rim.points), 1)), axis=1))
+def _unobstructed(mesh: Mesh, rim: Rim, points: Floats) -> NDArray[np.bool_]:
+    """(N,) bool: points at the rim with nothing in front of them."""
+    return visible_points(mesh, points, np.append(rim.outwards, np.zeros((len(points), 1)), axis=1))

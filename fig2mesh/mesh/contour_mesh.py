@@ -62,6 +62,11 @@ def ribbon(rim: Rim, width: Floats, color: Floats) -> ContourMesh | None:
     return ContourMesh(mesh, np.tile(_bytes(color[used]), (2, 1)), culled=False)
 
 
+def front_of(ribbon: Mesh) -> Mesh:
+    """The side of a ribbon that faces the viewer: the first half of its faces."""
+    return Mesh(ribbon.vertices, ribbon.faces[: len(ribbon.faces) // 2])
+
+
 def hull(mesh: Mesh, color: Floats) -> ContourMesh:
     """Inverted hull; mesh : the surface before it was inset; color : (V, 3) sRGB 0-255."""
     return ContourMesh(Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1])), _bytes(color), culled=True)

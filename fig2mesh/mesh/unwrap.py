@@ -8,7 +8,7 @@ brings no more charts, rather fewer. Turned charts are off because xatlas mirror
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,10 +42,13 @@ class Drawn:
 
     faces : (F,) bool, triangles that are wholly visible
     pixels : (V, 2) float64, positions of the vertices in the drawing, pixels, y down
+    line_pixels, line_faces : (L, 2) and (M, 3) int, the same of a ribbon that shows the drawn contour
     """
 
     faces: BoolArray
     pixels: NDArray[np.float64]
+    line_pixels: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    line_faces: NDArray[np.int32] = field(default_factory=lambda: np.empty((0, 3), np.int32))
 
 
 def unwrap(mesh: Mesh, *, texture_size: int, padding: int = 4, drawn: Drawn | None = None) -> UvMesh:
@@ -91,11 +94,13 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
     pixels = drawn.pixels[indices]
     rest = _part(mesh, ~drawn.faces)
     # A drawn pixel is a texel, or less of one where the texture is small.
-    area = float(_flat_areas(pixels, local).sum())
+    line = drawn.line_pixels, drawn.line_faces.astype(np.int64)
+    area = float(_flat_areas(pixels, local).sum() + _flat_areas(*line).sum())
     usable = FILL * texture_size**2
-    longest = float(np.ptp(pixels, axis=0).max())
+    longest = float(np.ptp(np.concatenate([pixels, line[0]]), axis=0).max())
     scale = min(1.0, math.sqrt(MAX_DRAWN_SHARE * usable / max(area, 1e-9)), (texture_size - 4 * padding - 4) / longest)
-    units = math.sqrt(area / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
+    seen = float(_flat_areas(pixels, local).sum())
+    units = math.sqrt(seen / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
     layout = None
     if len(rest[1]):
         piece = Mesh(mesh.vertices[rest[0]], rest[1].astype(np.int32))
@@ -109,6 +114,8 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
         charts = [(pixels * scale, local)]
         if layout is not None:
             charts.append((layout[2] * factor, layout[1]))
+        if len(line[1]):
+            charts.append((line[0] * scale, line[1]))
         placed = _place(charts, texture_size, padding + 1)
         if placed is not None:
             break
@@ -128,7 +135,8 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
         count += len(vertex)
     uv = np.clip(np.concatenate(positions) / texture_size, 0.0, 1.0).astype(np.float32)
     sourced = np.concatenate(sources).astype(np.int32)
-    return UvMesh(mesh, all_faces.astype(np.int32), sourced, uv, (texture_size, texture_size))
+    line_uv = np.clip(placed[-1][0] / texture_size, 0.0, 1.0).astype(np.float32) if len(line[1]) else None
+    return UvMesh(mesh, all_faces.astype(np.int32), sourced, uv, (texture_size, texture_size), line_uv)
 
 
 def _upright(texels: NDArray[np.float64], height: float) -> NDArray[np.float64]:

@@ -8,9 +8,10 @@ from fig2mesh.field.body import Body
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.bake import Baked
 from fig2mesh.mesh.bake import bake as bake_mesh
-from fig2mesh.mesh.contour import Contour
+from fig2mesh.mesh.contour import Contour, ContourLevel
+from fig2mesh.mesh.contour_mesh import front_of
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.records import Figure, UvMesh
+from fig2mesh.records import Figure, Mesh, UvMesh
 from fig2mesh.stages.unwrap import texels_of_level
 from fig2mesh.texture.sources import Sources
 
@@ -37,6 +38,11 @@ def bake(
             body,
             inset=contour.levels[level].vertices,
             bare=contour.bare,
+            ribbon=_ribbon(contour.levels[level]),
         )
         for level, mesh in enumerate(unwrap)
     )
+
+
+def _ribbon(level: ContourLevel) -> Mesh | None:
+    return None if level.line is None or level.line.culled else front_of(level.line.mesh)

@@ -43,13 +43,15 @@ def model(
             texture=Texture(texture.color),
             observed=Texture(texture.observed[..., None]),
             parts=None if level.parts is None else level.parts[mesh.solid_index],
-            outline=_outline(contour, inset, asset, level.vertices),
+            outline=_outline(contour, inset, asset, level.vertices, mesh.line_uv),
         )
         for level, mesh, texture, inset in zip(bare, unwrap, bake, contour.levels, strict=True)
     )
 
 
-def _outline(contour: Contour, level: ContourLevel, asset: Transform, surface: FloatArray) -> OutlineMesh | None:
+def _outline(
+    contour: Contour, level: ContourLevel, asset: Transform, surface: FloatArray, uv: FloatArray | None
+) -> OutlineMesh | None:
     if level.line is None:
         return None
     return OutlineMesh(
@@ -59,6 +61,7 @@ def _outline(contour: Contour, level: ContourLevel, asset: Transform, surface: F
         culled=level.line.culled,
         surface=surface,
         width_m=float(asset.matrix[0, 0]) * contour.width,
+        uv=uv,
     )
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.bake import drawn_faces
+from fig2mesh.mesh.contour import Contour
+from fig2mesh.mesh.contour_mesh import front_of
 from fig2mesh.mesh.unwrap import Drawn
 from fig2mesh.mesh.unwrap import unwrap as unwrap_mesh
 from fig2mesh.records import Figure, Mesh, UvMesh
@@ -13,13 +17,19 @@ from fig2mesh.records import Figure, Mesh, UvMesh
 MIN_TEXELS = 128
 
 
-def unwrap(figure: Figure, simplify: tuple[Mesh, ...], *, texture_size: int) -> tuple[UvMesh, ...]:
+def unwrap(figure: Figure, simplify: tuple[Mesh, ...], contour: Contour, *, texture_size: int) -> tuple[UvMesh, ...]:
     """Texture coordinates: the visible part as in the drawing, the rest as charts."""
     frame = image_frame(figure)
     unwrapped = []
-    for level, mesh in enumerate(simplify):
-        pixels = frame.image_from_figure(mesh.vertices[:, :2].astype(np.float64))
-        drawn = Drawn(drawn_faces(mesh), pixels)
+    for level, (mesh, inset) in enumerate(zip(simplify, contour.levels, strict=True)):
+        shown = Mesh(inset.vertices, mesh.faces)
+        pixels = frame.image_from_figure(shown.vertices[:, :2].astype(np.float64))
+        drawn = Drawn(drawn_faces(shown), pixels)
+        if inset.line is not None and not inset.line.culled:
+            ribbon = inset.line.mesh
+            drawn = replace(
+                drawn, line_pixels=frame.image_from_figure(ribbon.vertices), line_faces=front_of(ribbon).faces
+            )
         unwrapped.append(unwrap_mesh(mesh, texture_size=texels_of_level(texture_size, level), drawn=drawn))
     return tuple(unwrapped)
 

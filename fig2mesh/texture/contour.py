@@ -42,6 +42,9 @@ DARKER: Final = 35.0
 ALIKE: Final = 75.0
 """Colour tolerance, RGB 0-255, of one pen's lines: thin ones are mixed with what is beside them."""
 
+MIXED: Final = 0.75
+"""Largest share of the colour beside it in the darkest colour of a thin line."""
+
 CLUSTER: Final = 45.0
 """The same within the core of a pen's lines."""
 
@@ -80,10 +83,11 @@ class DrawnLine:
 
 @dataclass(frozen=True)
 class _Profiles:
-    """Reading of the picture at N rim points: darkest colour (N, 3), width to the half-way colour, NaN where the line
-    has no end, and rise of luminance behind it (N,)."""
+    """Reading of the picture at N rim points: darkest colour and the one beside it (N, 3), width to the half-way
+    colour, NaN where the line has no end, and rise of luminance behind it (N,)."""
 
     ink: Floats
+    beside: Floats
     width: Floats
     rise: Floats
 
@@ -111,6 +115,7 @@ def drawn_line(
         apart = np.linalg.norm(profiles.ink[:, None] - pens[:, 0:3], axis=-1)
         nearest = apart.argmin(axis=1)
         inked = apart[np.arange(len(points)), nearest] <= ALIKE
+        inked |= _mixed(profiles, pens[nearest, :3]) & (profiles.width <= THICK_PX * frame.units_per_px)
         usual = pens[nearest, 3]
         ends = inked & (profiles.width <= 1.5 * SPREAD * usual) & (profiles.rise >= DARKER)
         width = np.where(ends, profiles.width, np.where(inked, np.nan, 0.0))
@@ -158,7 +163,15 @@ def _read(picture: NDArray[np.float32], frame: ImageFrame, points: Floats, outwa
     ink = np.where(late[:, None], colours[:, 0], ink)
     width[late] = np.nan
     rise = np.where(has_end, luminance[rows, beside] - luminance[rows, core], 0.0)
-    return _Profiles(ink, width, rise)
+    return _Profiles(ink, colours[rows, beside], width, rise)
+
+
+def _mixed(profiles: _Profiles, pen: Floats) -> NDArray[np.bool_]:
+    """(N,) bool: colours that are mixed of a pen's (N, 3) and what is beside the line, as those of thin lines are."""
+    away = profiles.beside - pen
+    share = np.einsum("nd,nd->n", profiles.ink - pen, away) / np.maximum(np.einsum("nd,nd->n", away, away), 1e-9)
+    off = np.linalg.norm(profiles.ink - pen - share[:, None] * away, axis=1)
+    return np.asarray((share <= MIXED) & (off <= ALIKE / 2))
 
 
 def _pens(profiles: _Profiles, shown: NDArray[np.bool_], px: float) -> Floats:
