@@ -114,14 +114,15 @@ def drawn_line(
     if len(pens):
         apart = np.linalg.norm(profiles.ink[:, None] - pens[:, 0:3], axis=-1)
         nearest = apart.argmin(axis=1)
-        inked = apart[np.arange(len(points)), nearest] <= ALIKE
-        inked |= _mixed(profiles, pens[nearest, :3]) & (profiles.width <= THICK_PX * frame.units_per_px)
+        pure = apart[np.arange(len(points)), nearest] <= ALIKE
+        thin = profiles.width <= THICK_PX * frame.units_per_px
+        inked = pure | (thin & _mixed(profiles, pens[nearest, :3]))
         usual = pens[nearest, 3]
         ends = inked & (profiles.width <= 1.5 * SPREAD * usual) & (profiles.rise >= DARKER)
         width = np.where(ends, profiles.width, np.where(inked, np.nan, 0.0))
         color = pens[nearest, :3]
         width[~shown] = np.nan
-        if (width > 0).sum() < MIN_DRAWN * max(int(shown.sum()), 1):
+        if (pure & (width > 0)).sum() < MIN_DRAWN * max(int(shown.sum()), 1):
             return DrawnLine(np.zeros(len(points)), color, pens[:0, :3])
     return DrawnLine(width, color, pens[:, :3])
 
