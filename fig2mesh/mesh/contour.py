@@ -28,6 +28,9 @@ WIDER, SOFT_PX = 1.1, 0.75
 MIN_TAKEN = 0.6
 """Least share of a line's width by which the surface is inset for the line to be taken off it: the rest would show."""
 
+MIN_DEPTH = 0.25
+"""Least depth of the ribbon's inner edge below the surface, relative to its width."""
+
 
 @dataclass(frozen=True)
 class ContourLevel:
@@ -83,7 +86,7 @@ def contour_of(
         moved = inset(mesh, normals, widths)
         # Thin things are inset by less than the line's width, and the rest of the line stays on the surface.
         taken = rim.at(np.linalg.norm(mesh.vertices - moved, axis=1))
-        stands = _standing(mesh, rim, line.width, taken)
+        stands = _standing(mesh, rim, line.width, taken, body)
         if bare is None:
             width = float(np.median(line.width[drawn]))
             off = shown & (stands >= MIN_TAKEN * rim.at(widths))
@@ -97,12 +100,14 @@ def contour_of(
     return Contour(tuple(levels), width, bare)
 
 
-def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats) -> Floats:
-    """(N,) width of the ribbon: none where it would be seen from the front and nothing is drawn."""
-    middle = rim.points.copy()
-    middle[:, :2] -= 0.5 * taken[:, None] * rim.outwards
+def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats, body: Body) -> Floats:
+    """(N,) width of the ribbon: none where it would be seen from the front and nothing is drawn, and none where it would
+    leave the body: on flat soles and hems the rim wanders, and its normal with it."""
+    inwards = np.append(-rim.outwards, np.zeros((len(taken), 1)), axis=1)
+    middle, end = (rim.points + share * taken[:, None] * inwards for share in (0.5, 1.0))
     bare = ~(steady(rim, drawn) > 0) & _unobstructed(mesh, rim, middle)
-    return np.where(bare, 0.0, taken)
+    outside = body.distance(end.astype(np.float32)) > -MIN_DEPTH * taken
+    return np.where(bare | outside, 0.0, taken)
 
 
 def _unobstructed(mesh: Mesh, rim: Rim, points: Floats) -> NDArray[np.bool_]:
