@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from exporters.asset import without_outline
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
 from fig2mesh.conversion.convert import run_stages
 from fig2mesh.errors import InputError
@@ -154,8 +155,9 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     asset = asset_from_figure(done.results[lift], done.results[simplify][0].vertices, FIGURE_HEIGHT)
     pixel, origin_px = on_drawing(frame, asset)
     similar = front_similarity(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    missing = gap(finest, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    front, wall, shape, law = front_view(finest), thinnest_wall(finest), quality(finest), laws(finest)
+    bare = without_outline(finest)
+    missing = gap(bare, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    front, wall, shape, law = front_view(bare), thinnest_wall(bare), quality(bare), laws(bare)
     # FIGURE units are metres at this height.
     deviations = [level.deviation_m for level in levels] + [deviation(simplify_mesh(mesh, COARSE), mesh)]
     names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
