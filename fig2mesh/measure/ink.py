@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class SideInk:
 def side_ink(
     mesh: TexturedMesh,
     bare: TexturedMesh,
-    pens: NDArray[np.floating],
+    pens: NDArray[Any],
     width_m: float,
     yaws: Sequence[float] = YAWS,
 ) -> SideInk:
@@ -89,7 +89,7 @@ def pens_of(mesh: TexturedMesh) -> ByteArray:
     return np.unique(mesh.outline.colors, axis=0)
 
 
-def _near(picture: ByteArray, pens: NDArray[np.floating]) -> BoolArray:
+def _near(picture: ByteArray, pens: NDArray[Any]) -> BoolArray:
     """(H, W) bool: colours near one of the pens."""
     colours = picture[..., :3].astype(np.float32)
     near = np.zeros(colours.shape[:2], np.bool_)
