@@ -27,6 +27,9 @@ RIM: Final = 1.3
 NEAR: Final = 75.0
 """Largest distance of ink from the pen's colour, RGB 0-255: soft edges of lines are mixed with what is beside them."""
 
+SHIFT: Final = 0.5
+"""Tolerance for lines inside the figure, line widths: the inset moves them."""
+
 PIXELS: Final = 4.0
 """Pixels per line width ..."""
 
@@ -56,8 +59,8 @@ def side_ink(
     """Measure the contour's ink inside of side views.
 
     A pixel shows contour ink where its colour is near a pen's and the same model without its contour has another colour
-    there. Black clothes, hair and lines inside the figure are alike in both, and do not count. Within `RIM` line widths
-    of the view's silhouette ink is where it belongs.
+    there and within `SHIFT` line widths around it. Black clothes, hair and lines inside the figure are alike in both, and
+    do not count. Within `RIM` line widths of the view's silhouette ink is where it belongs.
 
     Parameters
     ----------
@@ -77,7 +80,7 @@ def side_ink(
         bounds = left - pixel, bottom - pixel, left + (size[0] - 1) * pixel, bottom + (size[1] - 1) * pixel
         shown, without = (render_mesh(one, yaw_deg=yaw, size=size, bounds=bounds, samples=1) for one in (mesh, bare))
         inner = _distance(shown[..., 3] > 0) > RIM * pixels
-        ink = inner & _near(shown, pens) & ~_near(without, pens)
+        ink = inner & _near(shown, pens) & (_distance(~_near(without, pens)) > SHIFT * pixels)
         inked, inside, length = inked + int(ink.sum()), inside + int(inner.sum()), length + _length(ink)
     return SideInk(inked / max(inside, 1), inked / length / pixels if length else 0.0)
 
@@ -98,9 +101,9 @@ def _near(picture: ByteArray, pens: NDArray[Any]) -> BoolArray:
     return near
 
 
-def _distance(shown: BoolArray) -> NDArray[np.float64]:
-    """(H, W) distance to the nearest pixel outside, pixels; beyond the picture is outside."""
-    return np.asarray(ndimage.distance_transform_edt(np.pad(shown, 1)))[1:-1, 1:-1]
+def _distance(area: BoolArray) -> NDArray[np.float64]:
+    """(H, W) distance to the nearest pixel outside of an area, pixels; beyond the picture is outside."""
+    return np.asarray(ndimage.distance_transform_edt(np.pad(area, 1)))[1:-1, 1:-1]
 
 
 def _length(ink: BoolArray) -> float:

@@ -73,6 +73,13 @@ def test_black_clothes_do_not_count() -> None:
         assert side_ink(box((0.0, 0.1), fill=fill), box(fill=fill), PENS, LINE).share == 0
 
 
+def test_lines_inside_the_figure_may_move_a_little() -> None:
+    bare = box((0.0, LINE))
+    assert side_ink(box((0.004, LINE + 0.004)), bare, PENS, LINE).share == 0
+    moved = side_ink(box((0.06, LINE + 0.06)), bare, PENS, LINE)
+    assert moved.share == pytest.approx(LINE / (DEPTH - 2 * RIM * LINE), rel=0.1)
+
+
 @pytest.mark.parametrize("line", [0.002, 0.01, 0.03])
 def test_share_of_a_band_grows_only_with_the_band(line: float) -> None:
     found = side_ink(box((0.0, 0.05)), box(), PENS, line)
