@@ -58,9 +58,9 @@ def side_ink(
 ) -> SideInk:
     """Measure the contour's ink inside of side views.
 
-    A pixel shows contour ink where its colour is near a pen's and the same model without its contour has another colour
-    there and within `SHIFT` line widths around it. Black clothes, hair and lines inside the figure are alike in both, and
-    do not count. Within `RIM` line widths of the view's silhouette ink is where it belongs.
+    A pixel shows contour ink where its colour is near a pen's and the same model without its contour has other colours
+    there and within `SHIFT` line widths. Black clothes, hair and lines inside the figure are alike in both, and do not
+    count. Within `RIM` line widths of the view's silhouette ink is where it belongs.
 
     Parameters
     ----------
