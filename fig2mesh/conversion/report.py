@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from exporters.asset import without_outline
 from exporters.file_digest import sha256_of
 from exporters.sampling import observed_shares
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
@@ -68,7 +69,7 @@ def model_measures(done: Conversion) -> dict[str, Any]:
     if shares is not None:
         observed = {"front_psnr_db": front.psnr_db, "front_ssim": front.ssim, "observed": _by_name(shares)}
     return {
-        **shape_measures(asset.mesh),
+        **shape_measures(without_outline(asset.mesh)),
         "pieces_drawn": done.run.pieces,
         "silhouette_iou": iou,
         **observed,

@@ -12,13 +12,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from exporters.asset import without_outline
 from fig2mesh.asset_frame import asset_from_figure, on_drawing
 from fig2mesh.conversion.convert import run_stages
+from fig2mesh.conversion.stores import MemoryStore
 from fig2mesh.errors import InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.measure.bleed import bleed_share
 from fig2mesh.measure.front import flange_share, front_view, gap, wall_share
+from fig2mesh.measure.ink import pens_of, side_ink
 from fig2mesh.measure.model import front_similarity, silhouette_iou
+from fig2mesh.measure.outline import outline_laws
 from fig2mesh.measure.solid import laws, quality, thinnest_wall
 from fig2mesh.mesh.simplify import deviation
 from fig2mesh.mesh.simplify import simplify as simplify_mesh
@@ -77,6 +81,12 @@ COLUMNS = (
     Column("front_psnr_db", "PSNR dB", ".1f", 1, "min"),
     Column("front_ssim", "SSIM", ".3f", 1, "min"),
     Column("bleed_share", "bleed %", ".2f", 100),
+    Column("side_ink_share", "ink from the side %", ".2f", 100),
+    Column("side_ink_width", "its width, lines", ".1f"),
+    Column("outline_closed", "outline closed", "yes", 1, "min"),
+    Column("outline_inverted", "outline inverted", "yes", 1, "min"),
+    Column("outline_outside_mm", "outline outside mm", ".2f"),
+    Column("outline_turned", "turned by inset", "d"),
     Column("gap_share", "gap %", ".2f", 100),
     Column("gap_radius_mm", "gap mm", ".1f"),
     Column("flange_share", "flange %", ".2f", 100),
@@ -144,8 +154,9 @@ def evaluate_figures(
 def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     """Measures of one drawing's model, by the keys of `COLUMNS`."""
     figure = read_figure(**drawing.arguments())
-    settings = replace(settings, lods=LEVELS)
-    done = run_stages(figure, settings, (lift, solid, simplify, model), height_m=FIGURE_HEIGHT)
+    settings, store = replace(settings, lods=LEVELS), MemoryStore()
+    done = run_stages(figure, settings, (lift, solid, simplify, model), height_m=FIGURE_HEIGHT, store=store)
+    dropped = run_stages(figure, replace(settings, contours="drop"), (model,), height_m=FIGURE_HEIGHT, store=store)
     figure, pieces = done.figure, done.pieces
     levels = done.results[model]
     finest, mesh = levels[0], done.results[solid].mesh
@@ -154,8 +165,11 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
     asset = asset_from_figure(done.results[lift], done.results[simplify][0].vertices, FIGURE_HEIGHT)
     pixel, origin_px = on_drawing(frame, asset)
     similar = front_similarity(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    missing = gap(finest, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
-    front, wall, shape, law = front_view(finest), thinnest_wall(finest), quality(finest), laws(finest)
+    bare = without_outline(finest)
+    width_m = 0.0 if finest.outline is None else finest.outline.width_m
+    ink, outline = side_ink(finest, dropped.results[model][0], pens_of(finest), width_m), outline_laws(finest)
+    missing = gap(bare, figure.mask, metres_per_pixel=pixel, origin_px=origin_px)
+    front, wall, shape, law = front_view(bare), thinnest_wall(bare), quality(bare), laws(bare)
     # FIGURE units are metres at this height.
     deviations = [level.deviation_m for level in levels] + [deviation(simplify_mesh(mesh, COARSE), mesh)]
     names = [*(f"lod{number}" for number in range(LEVELS)), "coarse"]
@@ -164,6 +178,12 @@ def measure_drawing(drawing: Drawing, settings: Settings) -> Facts:
         "front_psnr_db": similar.psnr_db,
         "front_ssim": similar.ssim,
         "bleed_share": bleed_share(finest, figure.rgba, figure.mask, metres_per_pixel=pixel, origin_px=origin_px),
+        "side_ink_share": ink.share,
+        "side_ink_width": ink.width,
+        "outline_closed": outline.closed,
+        "outline_inverted": outline.inverted,
+        "outline_outside_mm": 1000 * outline.outside_m,
+        "outline_turned": outline.turned,
         "gap_share": missing.share,
         "gap_radius_mm": missing.radius_mm,
         "flange_share": flange_share(front),

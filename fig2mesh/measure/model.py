@@ -49,7 +49,8 @@ def silhouette_iou(
 ) -> float:
     """Intersection over union of the model's front silhouette and the drawn one, at the drawing's pixel centres.
 
-    mesh : ASSET; mask : (H, W) bool, IMAGE. Parts of the model outside of the drawing count against it.
+    mesh : ASSET, with its outline if it has one; mask : (H, W) bool, IMAGE. Parts of the model outside of the drawing
+    count against it.
     """
     if not mask.any():
         return 0.0
@@ -64,9 +65,9 @@ def silhouette_iou(
     step = -(-max(width, height) // MAX_SIDE_PX)
     drawn = every_step(mask, (u0, v0, u1, v1), step)
     origin = coarse_point(origin_px, (u0, v0), step)
-    visible = (
-        front_pixels(mesh, (drawn.shape[1], drawn.shape[0]), step * metres_per_pixel, origin, 1, "normals")[..., 3] > 0
-    )
+    size = drawn.shape[1], drawn.shape[0]
+    # Of the modes, only "textured" shows the outline.
+    visible = front_pixels(mesh, size, step * metres_per_pixel, origin, 1, "textured")[..., 3] > 0
     # Coarse rows can miss lines of one pixel's width altogether.
     return float((drawn & visible).sum() / max(int((drawn | visible).sum()), 1))
 
@@ -85,7 +86,7 @@ def front_similarity(
 
     Parameters
     ----------
-    mesh : ASSET
+    mesh : ASSET, with its outline if it has one
     rgba : (H, W, 4) uint8, IMAGE; straight alpha, opaque for scans
     mask : (H, W) bool, IMAGE; the figure in the drawing
     background : sRGB, behind both

@@ -1,8 +1,9 @@
 """Orthographic views of a finished model, rendered by ray casting.
 
 For demonstrations, contact sheets and measures (`fig2mesh.measure.model`). It renders the exported triangles and their
-texture, not the distance field, so it shows what a viewer of the file will show. The rays are those of
-`fig2mesh.mesh.raycast`, as in `fig2mesh.render`; pixels lie on a plane in metres here, so that they can be a drawing's.
+texture, not the distance field, so it shows what a viewer of the file will show: with the outline, of which an inverted
+hull shows the triangles whose front faces the viewer. The rays are those of `fig2mesh.mesh.raycast`, as in
+`fig2mesh.render`; pixels lie on a plane in metres here, so that they can be a drawing's.
 
 Views: yaw 0 shows the figure's front (camera at +Z of ASSET), yaw 90 its left side (camera at +X), 180 its
 back; a positive pitch raises the camera. The plane of a view has two coordinates in metres through the ASSET origin:
@@ -18,12 +19,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.asset import ByteArray, TexturedMesh
+from exporters.asset import ByteArray, TexturedMesh, without_outline
 from exporters.atomic_file import atomic_path
 from exporters.sampling import sample
 from fig2mesh.field.camera import axes
 from fig2mesh.mesh.pixels import straight_bytes
-from fig2mesh.mesh.raycast import MeshCaster, MeshHits, interpolated
+from fig2mesh.mesh.raycast import MeshCaster, MeshHits, interpolated, shown_vertices
 
 Mode = Literal["textured", "clay", "normals", "observed"]
 Bounds = tuple[float, float, float, float]
@@ -42,8 +43,8 @@ MARGIN = 0.04
 
 
 def view_bounds(mesh: TexturedMesh, yaw_deg: float, pitch_deg: float = 0.0) -> Bounds:
-    """Left, bottom, right, top of the mesh in the plane of a view, metres."""
-    flat = mesh.vertices @ axes(yaw_deg, pitch_deg)[:2].T
+    """Left, bottom, right, top of the mesh and its outline in the plane of a view, metres."""
+    flat = shown_vertices(mesh) @ axes(yaw_deg, pitch_deg)[:2].T
     (left, bottom), (right, top) = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
     return left, bottom, right, top
 
@@ -66,9 +67,10 @@ def render_mesh(
     mesh : ASSET
     yaw_deg, pitch_deg : direction of the camera, see above
     size : (width, height) of the picture, pixels
-    mode : "textured" the texture's (else the vertices') colours without shading; "clay" shaded and uncoloured;
-        "normals" the VIEW normals as 127.5 (n + 1); "observed" green where the drawing showed the surface, orange
-        where it is inferred. Attributes that the mesh lacks are shown as clay.
+    mode : "textured" the texture's (else the vertices') colours without shading, and the outline; "clay" shaded and
+        uncoloured; "normals" the VIEW normals as 127.5 (n + 1); "observed" green where the drawing showed the surface,
+        orange where it is inferred. Attributes that the mesh lacks are shown as clay. All but "textured" show the
+        surface as drawn, without outline.
     bounds : left, bottom, right, top of the picture's outer edges in the view's plane, metres; None: the whole mesh
         in the middle, with a margin
     background : sRGB; None: transparent
@@ -82,7 +84,8 @@ def render_mesh(
     if min(width, height, samples) < 1:
         raise ValueError(f"size and samples are {size} and {samples}, expected at least 1")
     left, bottom, right, top = _fitted(view_bounds(mesh, yaw_deg, pitch_deg), size) if bounds is None else bounds
-    caster, view_from_asset = MeshCaster(mesh), axes(yaw_deg, pitch_deg)
+    caster = MeshCaster(mesh if mode == "textured" else without_outline(mesh))
+    view_from_asset = axes(yaw_deg, pitch_deg)
     centre = view_from_asset @ caster.centre
     x = ((left + (np.arange(width * samples) + 0.5) / (width * samples) * (right - left)) - centre[0]) / caster.unit
     y = ((top - (np.arange(height * samples) + 0.5) / (height * samples) * (top - bottom)) - centre[1]) / caster.unit

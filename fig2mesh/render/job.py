@@ -12,6 +12,7 @@ from typing import Any
 
 from PIL import ImageColor
 
+from exporters.asset import without_outline
 from fig2mesh.conversion.convert import run_stages
 from fig2mesh.conversion.text_file import check_text, write_text
 from fig2mesh.errors import FigureError, InputError
@@ -146,7 +147,7 @@ def _mesh_scene(path: Path, request: PictureRequest) -> MeshScene:
         raise FigureError(path, "has no colours", "use --mode clay")
     if request.mode == "parts" and mesh.parts is None:
         raise FigureError(path, "has no part labels", "use a GLB made without --no-evidence")
-    return MeshScene(mesh)
+    return MeshScene(mesh if request.mode == "textured" else without_outline(mesh))
 
 
 def _sun(effects: frozenset[Effect], lonlat: tuple[float, float] | None, text: str | None) -> Sun | None:

@@ -164,8 +164,7 @@ class MeshScene:
         if needs.normals:
             normals = self._caster.normals(hits)
         if needs.labels:
-            nearest = hits.corners[np.arange(len(hits.corners)), hits.weights.argmax(axis=1)]
-            labels = np.zeros(len(nearest), np.uint8) if self.mesh.parts is None else self.mesh.parts[nearest]
+            labels = self._caster.labels(hits)
         counts = Counts(camera_rays=len(hits.depth), normals=len(normals))
         return SurfaceHits(hits.depth, points, normals, labels, hits), counts
 

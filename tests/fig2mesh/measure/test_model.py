@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from fig2mesh.measure.model import (
     silhouette_iou,
 )
 from fig2mesh.mesh.preview import render_mesh
+from tests.fig2mesh.mesh.outlined import hulled
 
 RADIUS, CENTRE_PX, RADIUS_PX = 0.9, (100.0, 110.0), 80.0
 SCALE = RADIUS / RADIUS_PX
@@ -113,6 +115,15 @@ def test_model_beside_the_drawing_scores_nothing(ball: TexturedMesh) -> None:
         rgba = drawing()[0]
         assert front_similarity(ball, rgba, mask, metres_per_pixel=SCALE, origin_px=origin).ssim == 0.0
     assert silhouette_iou(ball, mask, metres_per_pixel=SCALE * 1e-6, origin_px=ORIGIN_PX) < 0.2
+
+
+def test_silhouette_is_that_of_the_outline(ball: TexturedMesh) -> None:
+    found = [
+        silhouette_iou(mesh, drawing()[1], metres_per_pixel=SCALE, origin_px=ORIGIN_PX)
+        for mesh in (ball, hulled(ball, 0.1), replace(hulled(ball, 0.1), outline=None))
+    ]
+    assert found[0] == found[1]
+    assert found[2] == pytest.approx((0.8 / 0.9) ** 2, abs=0.01)
 
 
 def test_front_with_the_drawing_on_it_is_similar(ball: TexturedMesh) -> None:

@@ -11,6 +11,7 @@ from PIL import Image
 from exporters.asset import Texture, TexturedMesh
 from fig2mesh.field.camera import axes
 from fig2mesh.mesh.preview import LIGHT, render_mesh, view_bounds, views_sheet, write_preview
+from tests.fig2mesh.mesh.outlined import PEN, hulled
 
 # fmt: off
 FRONT, LEFT, BACK, RIGHT, TOP, BOTTOM = (
@@ -181,3 +182,44 @@ def test_preview_is_written_whole(box: TexturedMesh, tmp_path: Path) -> None:
 def test_bounds_of_views(box: TexturedMesh) -> None:
     np.testing.assert_allclose(view_bounds(box, 0), (-0.3, 0.0, 0.3, 1.8), atol=1e-7)
     np.testing.assert_allclose(view_bounds(box, 90), (-0.15, 0.0, 0.15, 1.8), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("yaw", "pitch", "colour"),
+    [(0, 0, FRONT), (90, 0, LEFT), (180, 0, BACK), (270, 0, RIGHT), (0, 90, TOP), (0, -90, BOTTOM)],
+)
+def test_hull_shows_a_line_of_its_width_from_every_side(
+    box: TexturedMesh, yaw: float, pitch: float, colour: tuple[int, ...]
+) -> None:
+    inset = 0.05
+    left, bottom, right, top = view_bounds(box, yaw, pitch)
+    size = round((right - left) * 100), round((top - bottom) * 100)
+    picture = render_mesh(
+        hulled(box, inset), yaw_deg=yaw, pitch_deg=pitch, size=size, bounds=(left, bottom, right, top), samples=1
+    )
+    inked = (picture[..., :3] == PEN).all(axis=2)
+    rim = np.ones_like(inked)
+    rim[5:-5, 5:-5] = False
+    assert (picture[..., 3] == 255).all()
+    np.testing.assert_array_equal(inked, rim)
+    assert tuple(picture[size[1] // 2, size[0] // 2, :3]) == colour
+
+
+def test_outline_of_two_sides_hides_what_is_behind_it(box: TexturedMesh) -> None:
+    picture = render_mesh(hulled(box, 0.05, culled=False), yaw_deg=30, size=(40, 60), background=PEN)
+    assert (picture[..., :3] == PEN).all()
+
+
+def test_other_modes_show_the_surface_as_drawn(box: TexturedMesh) -> None:
+    for mode in ("clay", "normals", "observed"):
+        drawn, hull = (render_mesh(mesh, yaw_deg=20, size=(40, 60), mode=mode) for mesh in (box, hulled(box, 0.05)))
+        np.testing.assert_array_equal(drawn, hull)
+
+
+def test_silhouette_and_bounds_are_those_of_the_outline(box: TexturedMesh) -> None:
+    hull = hulled(box, 0.05)
+    np.testing.assert_allclose(view_bounds(hull, 35, 10), view_bounds(box, 35, 10))
+    drawn, outlined = (render_mesh(mesh, yaw_deg=35, size=(60, 90))[..., 3] for mesh in (box, hull))
+    np.testing.assert_array_equal(drawn, outlined)
+    sheet = views_sheet(hull, yaws=(0, 90), clay_yaws=(0,), height=80)
+    assert (sheet == PEN).all(axis=2).any()

@@ -13,6 +13,7 @@ from exporters.colour import linear_from_srgb, srgb_from_linear
 from fig2mesh.field.body import Body
 from fig2mesh.field.camera import axes
 from fig2mesh.parts.smooth_union import smooth_union
+from fig2mesh.render.effects import Effect
 from fig2mesh.render.needs import Needs
 from fig2mesh.render.outline import ink_cover
 from fig2mesh.render.picture import AO_REACH, PictureRequest, render, view_of
@@ -29,6 +30,7 @@ from fig2mesh.render.shading import (
 )
 from fig2mesh.skeleton import PART_COLOURS
 from tests.drawn import Sketch, assemble
+from tests.fig2mesh.mesh.outlined import PEN, hulled
 from tests.fig2mesh.render.scenes import (
     DRAWN,
     HEAD,
@@ -341,3 +343,18 @@ def test_smooth_union_keeps_the_drawn_contour() -> None:
     more = (bare[..., 3] != grown[..., 3]).sum() / (bare[..., 3] > 0).sum()
     assert more < 0.003
     assert (bare[..., 0] != grown[..., 0]).any()
+
+
+@pytest.mark.parametrize("effects", [(), ("perspective",)])
+@pytest.mark.parametrize("yaw", [0.0, 70.0, 180.0])
+def test_finished_model_shows_its_hull_as_a_line(effects: tuple[Effect, ...], yaw: float) -> None:
+    radius, width = 0.5, 0.05
+    mesh = mesh_of(ball(radius).body, 0.02)
+    request = PictureRequest(size=(SIDE, SIDE), yaw_deg=yaw, effects=frozenset(effects))
+    scene = MeshScene(hulled(mesh, width))
+    shown = render(scene, request).rgba
+    drawn, inked = shown[..., 3] > 0, (shown == (*PEN, 255)).all(axis=2)
+    # In perspective both outlines are those of tangent cones; their radii still have the ratio of the balls', nearly.
+    assert (drawn & ~inked).sum() / drawn.sum() == pytest.approx(((radius - width) / radius) ** 2, abs=0.02)
+    np.testing.assert_array_equal(drawn, render(MeshScene(mesh), request).rgba[..., 3] > 0)
+    assert not inked[SIDE // 2 - 20 : SIDE // 2 + 20, SIDE // 2 - 20 : SIDE // 2 + 20].any()
