@@ -100,6 +100,7 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         "mode": 4,
     }
     item: dict[str, Any] = {"name": asset.name, "primitives": [primitive]}
+    shown = None
     if profile.extensions:
         if mesh.parts is not None:
             primitive["extensions"] = {"EXT_mesh_features": features(document, asset, mesh, attributes)}
@@ -116,7 +117,7 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         node |= _node_extras(asset, mesh)
     document.add("meshes", item)
     if mesh.outline is not None:
-        drawn = outline_mesh(document, mesh.outline, outline, profile)
+        drawn = outline_mesh(document, mesh.outline, outline, profile, shown is not None)
         node["children"] = [document.add("nodes", {"name": OUTLINE, "mesh": drawn})]
     return document, mesh.texture
 

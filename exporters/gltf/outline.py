@@ -36,10 +36,13 @@ def outline_form(mesh: dict[str, Any]) -> str:
     return str(form) if form in (HULL, RIBBON) else ""
 
 
-def outline_mesh(document: Document, outline: OutlineMesh, positions: NDArray[Any], profile: Profile) -> int:
+def outline_mesh(
+    document: Document, outline: OutlineMesh, positions: NDArray[Any], profile: Profile, property_texture: bool
+) -> int:
     """Add the mesh of an outline; returns its index.
 
     positions : (N, 3) of `outline.vertices`, float32, or quantised for the same transform as the figure's
+    property_texture : whether the document has one
     """
     order, faces = _ordered(outline, profile)
     positions, colors = positions[order], outline.colors[order]
@@ -48,6 +51,12 @@ def outline_mesh(document: Document, outline: OutlineMesh, positions: NDArray[An
     more = bounds(positions) | ({"normalized": True} if positions.dtype.kind == "u" else {})
     position = document.accessor("outline position", positions, ARRAY_BUFFER, "ATTRIBUTES", **more)
     primitive: dict[str, Any] = {"attributes": {"POSITION": position}, "indices": indices, "mode": 4}
+    if property_texture:
+        # CesiumJS (1.140) samples the property textures of a document in every primitive, and fails without these.
+        nowhere = np.zeros((len(positions), 2), np.uint8)
+        primitive["attributes"]["TEXCOORD_0"] = document.accessor(
+            "outline texcoord", nowhere, ARRAY_BUFFER, "ATTRIBUTES", normalized=True
+        )
     primitive["material"] = _material(document, colors, primitive["attributes"], profile)
     facts = {"form": HULL if outline.culled else RIBBON, "width_m": float(outline.width_m)}
     return document.add("meshes", {"name": OUTLINE, "primitives": [primitive], "extras": {OUTLINE: facts}})

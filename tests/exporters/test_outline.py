@@ -94,6 +94,9 @@ def test_colours_of_the_pens(name: str, profile: str | None) -> None:
     assert ("KHR_materials_unlit" in material.get("extensions", {})) == (profile in (None, "cesiumjs"))
     surface, attributes = material["pbrMetallicRoughness"], primitive["attributes"]
     assert "NORMAL" not in attributes
+    # CesiumJS samples property textures, if there are any, in every primitive.
+    property_textures = bool(gltf.extension("EXT_structural_metadata").get("propertyTextures"))
+    assert ("TEXCOORD_0" in attributes) == (property_textures or profile == "qgis")
     pens = np.unique(given.mesh.outline.colors, axis=0)
     if profile == "qgis":
         source = gltf.item("textures", surface["baseColorTexture"]["index"])["source"]
