@@ -16,17 +16,21 @@ def solid_facts(vertices: NDArray[Any], faces: NDArray[Any]) -> dict[str, Any]:
     if not len(faces):
         return {"triangles": 0}
     found = measure_topology(vertices, faces)
-    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
     return {
         "triangles": len(faces),
-        "bounds_m": [low.tolist(), high.tolist()],
-        "size_m": (high - low).tolist(),
+        **size_facts(vertices),
         "watertight": found.closed,
         "solid": found.solid,
         "components": found.components,
         "genus": found.genus,
         "volume_m3": found.volume,
     }
+
+
+def size_facts(vertices: NDArray[Any]) -> dict[str, Any]:
+    """Bounds and size of vertices (V, 3), V > 0, in the frame of the file."""
+    low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
+    return {"bounds_m": [low.tolist(), high.tolist()], "size_m": (high - low).tolist()}
 
 
 def file_sizes(*paths: Path) -> dict[str, int]:

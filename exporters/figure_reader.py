@@ -92,7 +92,7 @@ def read_figure(path: Path) -> PlacedFigure:
 
 
 def _bounds(gltf: Gltf) -> tuple[Box, Box]:
-    """Corners, in the TILE frame, of a box round all meshes of the scene.
+    """Corners, in the TILE frame, of a box round all meshes of the scene, outlines included.
 
     From the accessors' min and max, which glTF requires, so compressed files need not be decompressed.
     """
@@ -121,7 +121,9 @@ def _bounds(gltf: Gltf) -> tuple[Box, Box]:
 def _observed(gltf: Gltf, shares: NDArray[np.float64]) -> float | None:
     """Share of the surface area that is observed in the drawing; None where the mesh is compressed."""
     used = gltf.document.get("extensionsUsed", [])
-    if len(gltf.items("meshes")) != 1 or any("compression" in each or "quantization" in each for each in used):
+    if len(gltf.items("meshes")) - len(gltf.outlines) != 1 or any(
+        "compression" in each or "quantization" in each for each in used
+    ):
         return None
     if not gltf.primitives(0) or "_FEATURE_ID_0" not in gltf.primitives(0)[0]["attributes"]:
         raise DamagedFile("vertices have no part")

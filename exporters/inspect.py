@@ -23,7 +23,8 @@ FACTS = {
 }
 KEYS = (
     "format", "files", "name", "copyright", "generator", "vertices", "triangles", "bounds_m", "size_m", "watertight",
-    "solid", "components", "genus", "volume_m3", "texture_px", "parts", "observed", "placement", "lods", "metadata",
+    "solid", "components", "genus", "volume_m3", "outline", "texture_px", "parts", "observed", "placement",
+    "lods", "metadata",
 )
 # fmt: on
 
@@ -33,7 +34,8 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
 
     path : as for `exporters.validate.validate`
     returns : format, files (name → bytes), name, copyright, generator, vertices, triangles, bounds_m [low, high] in
-        the frame of the file, size_m, watertight, solid, components, genus, volume_m3, texture_px [width, height],
+        the frame of the file, size_m, watertight, solid, components, genus, volume_m3, outline (form and triangles of
+        the drawn contour, which only bounds_m and size_m also count), texture_px [width, height],
         parts, observed (part → observed share of its surface), placement (lon_deg, lat_deg, height_m, heading_deg and
         any further recorded values), lods, metadata
 

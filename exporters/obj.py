@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.asset import Asset
+from exporters.asset import Asset, without_outline
 from exporters.georeference import georeference
 from exporters.sampling import vertex_colors
 from exporters.solid import solid_of, unit_normals
@@ -26,7 +26,8 @@ def write_obj(asset: Asset, path: Path | str) -> None:
     path : the .obj file, replaced if it exists, as are the files next to it
     """
     path = Path(path)
-    mesh, solid = asset.mesh, solid_of(asset.mesh)
+    mesh = without_outline(asset.mesh)
+    solid = solid_of(mesh)
     material = path.with_suffix(".mtl")
 
     head = ["# fig2mesh; metres, y up, front along +z"]

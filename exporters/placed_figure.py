@@ -31,7 +31,7 @@ class PlacedFigure:
 
     name : display name; need not be unique
     placement : its place on the earth
-    low, high : corners of the box round all levels of detail, TILE frame, metres
+    low, high : corners of the box round all levels of detail and their outlines, TILE frame, metres
     contents : one file per level of detail, finest first: paths with slashes, relative to the tileset's folder, or
         their paths before they are copied there
     errors : per level, the largest distance to the finest surface, metres; the first is 0
@@ -107,7 +107,8 @@ def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
     """
     if asset.placement is None:
         raise ExportError(asset.name, "the format needs a place on the earth", "give --lonlat LON LAT")
-    vertices = np.concatenate([tile_from_asset().apply(mesh.vertices) for mesh in asset.lods])
+    outlines = [mesh.outline.vertices for mesh in asset.lods if mesh.outline is not None]
+    vertices = tile_from_asset().apply(np.concatenate([*(mesh.vertices for mesh in asset.lods), *outlines]))
     mesh = asset.mesh
     shares = observed_shares(mesh) or {}
     labels = [] if mesh.parts is None else np.unique(mesh.parts).tolist()

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.asset import Asset
+from exporters.asset import Asset, without_outline
 from exporters.georeference import georeference
 from exporters.sampling import vertex_colors
 from exporters.solid import solid_of, unit_normals
@@ -26,7 +26,7 @@ def write_ply(asset: Asset, path: Path | str) -> None:
     asset : vertices in the ASSET frame (y up, metres), written unchanged as float32
     path : the .ply file, replaced if it exists
     """
-    mesh = asset.mesh
+    mesh = without_outline(asset.mesh)
     solid = solid_of(mesh)
     count = len(solid.first)
     copies = np.bincount(solid.vertex, minlength=count)

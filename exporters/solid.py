@@ -160,6 +160,19 @@ def measure_topology(vertices: NDArray[Any], faces: NDArray[Any]) -> Topology:
     )
 
 
+def unmatched_edges(faces: NDArray[Any]) -> int:
+    """Number of edges of triangles without one of another triangle in the opposite direction.
+
+    0 for closed surfaces, and for flat ones whose every triangle has another one on its back.
+    faces : (F, 3) integer, seams undone
+    """
+    corners = np.asarray(faces, dtype=np.int64)
+    start, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    key = np.minimum(start, end) * (int(corners.max(initial=0)) + 1) + np.maximum(start, end)
+    _, edge = np.unique(key, return_inverse=True)
+    return int(np.abs(np.bincount(edge, weights=np.sign(end - start))).sum())
+
+
 def piece_volumes(triangles: NDArray[np.float64], piece: NDArray[np.int32]) -> NDArray[np.float64]:
     """(P,) signed volume of each component, cubic units of the vertices.
 

@@ -19,8 +19,10 @@ from exporters.errors import ExportError
 from exporters.findings import Finding, as_infos, check_place, check_solid
 from exporters.gltf.khronos import khronos_findings
 from exporters.gltf.ktx2 import size_of
+from exporters.gltf.outline import HULL
 from exporters.gltf.reader import Gltf, NotDecoded, read_gltf
 from exporters.gltf.shape import MESHOPT
+from exporters.solid import merged_by_position, unmatched_edges
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.image_file import MAX_TEXTURE_PX, TooLarge, check_texture
 
@@ -56,13 +58,15 @@ def check_gltf(path: Path, external: bool = True) -> list[Finding]:
         return [Finding("error", "UNREADABLE", error.finding, path.name)]
     own = gltf.document.get("asset", {}).get("generator") == "fig2mesh"
     findings = list(_check_document(gltf, own))
+    outlines = gltf.outlines
     for index, mesh in enumerate(gltf.items("meshes")):
         where = f"{path.name}: meshes/{index}"
         try:
             for number, primitive in enumerate(mesh["primitives"]):
                 findings += _check_primitive(gltf, primitive, f"{where}/primitives/{number}", own)
             findings += _check_manifold(gltf, index, where)
-            solid = check_solid(*gltf.solid_arrays(index), where)
+            check = _check_outline if index in outlines else _check_solid
+            solid = check(gltf, index, where)
             findings += solid if own or "EXT_mesh_manifold" in mesh.get("extensions", {}) else as_infos(solid)
         except NotDecoded as reason:
             findings.append(Finding("info", NOT_DECODED, str(reason), where))
@@ -235,6 +239,28 @@ def _check_property_textures(gltf: Gltf) -> Iterator[Finding]:
                 yield Finding("error", "PROPERTY_TEXTURE", f"property {key} is not in its class", where)
             if not 0 <= texture.get("index", -1) < len(gltf.items("textures")):
                 yield Finding("error", "PROPERTY_TEXTURE", f"{key}: unknown texture {texture.get('index')}", where)
+
+
+def _check_solid(gltf: Gltf, index: int, where: str) -> list[Finding]:
+    return check_solid(*gltf.solid_arrays(index), where)
+
+
+def _check_outline(gltf: Gltf, index: int, where: str) -> list[Finding]:
+    """Check a drawn contour: a hull must be a solid turned inside out, a ribbon visible from both sides.
+
+    Either way its material must be one-sided: with both sides shown, a hull hides the figure.
+    """
+    vertices, faces = gltf.solid_arrays(index)
+    if gltf.outlines[index] == HULL:
+        findings = check_solid(vertices, faces[:, ::-1], where)
+    elif count := unmatched_edges(merged_by_position(vertices, faces)[1]):
+        findings = [Finding("error", "ONE_SIDED", f"{count} edges of the ribbon without a triangle behind", where)]
+    else:
+        findings = []
+    for primitive in gltf.primitives(index):
+        if "material" in primitive and gltf.item("materials", primitive["material"]).get("doubleSided"):
+            findings.append(Finding("error", "TWO_SIDED", "the outline's material is doubleSided", where))
+    return findings
 
 
 def _check_manifold(gltf: Gltf, index: int, where: str) -> Iterator[Finding]:

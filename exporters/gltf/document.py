@@ -22,6 +22,17 @@ COMPONENT_TYPES = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "
 Mode = Literal["ATTRIBUTES", "TRIANGLES", "INDICES"]
 
 
+def bounds(values: NDArray[Any]) -> dict[str, Any]:
+    """Members `min` and `max` of the accessor of (N, W) values."""
+    return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+
+
+def index_array(faces: NDArray[np.int32], vertices: int) -> NDArray[Any]:
+    """Convert triangles (F, 3) to (3 F,) indices, 16 bits wide where the number of vertices allows it."""
+    # 65535 itself is the restart index and must not occur.
+    return faces.reshape(-1).astype(np.uint16 if vertices <= 65535 else np.uint32)
+
+
 class Document:
     """A document under construction.
 

@@ -18,15 +18,17 @@ from typing import Any
 from urllib.parse import quote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exporters.asset import Asset, Texture, TexturedMesh
 from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.gltf import xmp
-from exporters.gltf.document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
+from exporters.gltf.document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document, bounds, index_array
 from exporters.gltf.ktx2 import padded
 from exporters.gltf.material import linear_rgba, material, texture_file
 from exporters.gltf.meshopt import quantised, quantised_uv, reordered
+from exporters.gltf.outline import OUTLINE, outline_mesh
 from exporters.gltf.part_borders import split_at_parts
 from exporters.gltf.part_features import evidence, features, manifold
 from exporters.profiles import GENERAL, Profile
@@ -87,11 +89,10 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         mesh = reordered(mesh)
     if profile.texture == "ktx2":
         mesh = padded(mesh)
-    # 65535 itself is the restart index and must not occur.
-    index_type = np.uint16 if len(mesh.vertices) <= 65535 else np.uint32
-    corners = mesh.faces.reshape(-1).astype(index_type)
+    corners = index_array(mesh.faces, len(mesh.vertices))
     indices = document.accessor("indices", corners, ELEMENT_ARRAY_BUFFER, "TRIANGLES")
-    attributes = _attributes(document, mesh, node, asset.lit, profile)
+    figure, outline = _positions(mesh, node, profile)
+    attributes = _attributes(document, mesh, figure, asset.lit, profile)
     primitive: dict[str, Any] = {
         "attributes": attributes,
         "indices": indices,
@@ -99,6 +100,7 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         "mode": 4,
     }
     item: dict[str, Any] = {"name": asset.name, "primitives": [primitive]}
+    shown = None
     if profile.extensions:
         if mesh.parts is not None:
             primitive["extensions"] = {"EXT_mesh_features": features(document, asset, mesh, attributes)}
@@ -114,6 +116,9 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
     if not profile.extensions:
         node |= _node_extras(asset, mesh)
     document.add("meshes", item)
+    if mesh.outline is not None:
+        drawn = outline_mesh(document, mesh.outline, outline, profile, shown is not None)
+        node["children"] = [document.add("nodes", {"name": OUTLINE, "mesh": drawn})]
     return document, mesh.texture
 
 
@@ -146,10 +151,24 @@ def _node_extras(asset: Asset, mesh: TexturedMesh) -> dict[str, Any]:
     return {"extras": extras} if extras else {}
 
 
+def _positions(mesh: TexturedMesh, node: dict[str, Any], profile: Profile) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Positions of the vertices of the figure and of its outline, (0, 3) without one, as stored in the file.
+
+    Quantised ones are all in the frame of `node`, which gets its transform here: the outline's node is its child.
+    """
+    count = len(mesh.vertices)
+    outline = np.empty((0, 3), np.float32) if mesh.outline is None else mesh.outline.vertices
+    if not profile.compressed:
+        return mesh.vertices, outline
+    positions = quantised(np.concatenate([mesh.vertices, outline]))
+    node |= {"translation": list(positions.origin), "scale": [positions.scale] * 3}
+    return positions.steps[:count], positions.steps[count:]
+
+
 def _attributes(
-    document: Document, mesh: TexturedMesh, node: dict[str, Any], lit: bool, profile: Profile
+    document: Document, mesh: TexturedMesh, positions: NDArray[Any], lit: bool, profile: Profile
 ) -> dict[str, int]:
-    """Add the accessors of the vertices; for quantised positions also the transform of the node."""
+    """Add the accessors of the vertices; positions : as stored."""
     normals = mesh.normals
     if not profile.extensions and normals is None:
         normals = mesh.shading_normals  # the surface will be lit, and is smooth only with these
@@ -162,16 +181,14 @@ def _attributes(
 
     if profile.compressed:
         document.require("KHR_mesh_quantization")
-        positions = quantised(mesh.vertices)
-        node |= {"translation": list(positions.origin), "scale": [positions.scale] * 3}
-        add("POSITION", "position", positions.steps, normalized=True, **_bounds(positions.steps))
+        add("POSITION", "position", positions, normalized=True, **bounds(positions))
         if normals is not None:
             attributes["NORMAL"] = document.octahedral("normal", unit_normals(normals))
         if mesh.uv is not None:
             add("TEXCOORD_0", "texcoord", quantised_uv(mesh.uv), normalized=True)
     else:
         # tolist() of float32 gives the same doubles that a reader gets from the buffer.
-        add("POSITION", "position", mesh.vertices, **_bounds(mesh.vertices))
+        add("POSITION", "position", positions, **bounds(positions))
         if normals is not None:
             add("NORMAL", "normal", unit_normals(normals))
         if mesh.uv is not None:
@@ -179,7 +196,3 @@ def _attributes(
     if mesh.texture is None and mesh.colors is not None and profile.vertex_colors:
         add("COLOR_0", "color", linear_rgba(mesh.colors), normalized=True)
     return attributes
-
-
-def _bounds(values: Any) -> dict[str, Any]:
-    return {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}

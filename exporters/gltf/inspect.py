@@ -7,9 +7,11 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+from numpy.typing import NDArray
 
 from exporters.errors import ExportError
-from exporters.facts import file_sizes, solid_facts
+from exporters.facts import file_sizes, size_facts, solid_facts
+from exporters.gltf.outline import OUTLINE
 from exporters.gltf.reader import Gltf, read_gltf
 from exporters.texture_files import texture_size
 from georef.untrusted.damage import DamagedFile
@@ -26,13 +28,17 @@ def gltf_facts(path: Path) -> dict[str, Any]:
 
 def _facts(gltf: Gltf) -> dict[str, Any]:
     asset, extras, tables = gltf.document.get("asset", {}), gltf.extras, gltf.tables
-    meshes = range(len(gltf.items("meshes")))
+    outlines, images = gltf.scene_outlines(), gltf.items("images")
+    meshes = [mesh for mesh in range(len(gltf.items("meshes"))) if mesh not in gltf.outlines]
     solids = gltf.scene_solids()
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
     vertices = np.concatenate([np.empty((0, 3), np.float32), *(vertices for vertices, _ in solids)])
     faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
     referenced = [gltf.path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+    solid = solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces]))
+    if outlines and "bounds_m" in solid:
+        solid |= size_facts(np.concatenate([vertices, *(vertices for _, vertices, _ in outlines)]))
     return {
         "format": "glTF 2.0 binary" if gltf.path.suffix.lower() == ".glb" else "glTF 2.0",
         "files": file_sizes(gltf.path, *referenced),
@@ -44,13 +50,18 @@ def _facts(gltf: Gltf) -> dict[str, Any]:
             for mesh in meshes
             for primitive in range(len(gltf.primitives(mesh)))
         ),
-        **solid_facts(vertices, np.concatenate([np.empty((0, 3), np.int64), *faces])),
-        "texture_px": texture_size(gltf.image(0)) if gltf.items("images") else None,
+        **solid,
+        "outline": _outline_facts(outlines) if outlines else None,
+        "texture_px": texture_size(gltf.image(0)) if images and images[0].get("name") != OUTLINE else None,
         "parts": _part_names(gltf, tables[0]) if tables else None,
         "observed": _observed(gltf, tables[0]) if tables else None,
         "placement": extras.get("georeference"),
         "metadata": extras.get("metadata"),
     }
+
+
+def _outline_facts(outlines: list[tuple[str, NDArray[Any], NDArray[Any]]]) -> dict[str, Any]:
+    return {"form": outlines[0][0], "triangles": sum(len(faces) for _, _, faces in outlines)}
 
 
 def _part_names(gltf: Gltf, table: dict[str, Any]) -> list[str]:

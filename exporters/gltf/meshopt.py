@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.asset import FloatArray, TexturedMesh
+from exporters.asset import FloatArray, IntArray, TexturedMesh
 from exporters.errors import ExportError
 from georef.untrusted.damage import decoding
 
@@ -53,11 +53,7 @@ def reordered(mesh: TexturedMesh) -> TexturedMesh:
 
     Corners may be rotated within their triangles, as the codec does; unused vertices are removed.
     """
-    meshopt = codec()
-    corners, place, count = meshopt.reorder_mesh(mesh.faces.reshape(-1).astype(np.uint32), True, True)
-    order = np.argsort(place)[:count]
-    # As a reader will decode them, so that references to corners remain valid.
-    corners = meshopt.decode_index_buffer(meshopt.encode_index_buffer(corners), len(corners), 4)
+    order, faces = reordered_faces(mesh.faces)
 
     def picked(array: Any) -> Any:
         return None if array is None else array[order]
@@ -65,13 +61,22 @@ def reordered(mesh: TexturedMesh) -> TexturedMesh:
     return replace(
         mesh,
         vertices=mesh.vertices[order],
-        faces=corners.reshape(-1, 3).astype(np.int32),
+        faces=faces,
         normals=picked(mesh.normals),
         solid_index=mesh.solid_index[order],
         uv=picked(mesh.uv),
         colors=picked(mesh.colors),
         parts=picked(mesh.parts),
     )
+
+
+def reordered_faces(faces: IntArray) -> tuple[NDArray[np.int64], IntArray]:
+    """Reorder triangles (F, 3) as `reordered` does; returns the (V,) old vertex of each new one, and the new faces."""
+    meshopt = codec()
+    corners, place, count = meshopt.reorder_mesh(faces.reshape(-1).astype(np.uint32), True, True)
+    # As a reader will decode them, so that references to corners remain valid.
+    corners = meshopt.decode_index_buffer(meshopt.encode_index_buffer(corners), len(corners), 4)
+    return np.argsort(place)[:count], corners.reshape(-1, 3).astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,10 @@ class Quantised:
 
 
 def quantised(vertices: FloatArray) -> Quantised:
-    """Quantise vertices (V, 3) to 65535 steps of the longest side, uniformly so that normals remain valid."""
+    """Quantise vertices (V, 3) to 65535 steps of the longest side, uniformly so that normals remain valid.
+
+    Several meshes under one transform are quantised together.
+    """
     wide = vertices.astype(np.float64)
     low = wide.min(axis=0)
     scale = float((wide.max(axis=0) - low).max()) or 1.0

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from exporters.errors import ExportError
 from exporters.gltf import meshopt
 from exporters.gltf.container import Bytes, mapped, split_glb
+from exporters.gltf.outline import outline_form
 from exporters.gltf.shape import DOCUMENT, MESHOPT
 from exporters.solid import merged_by_position
 from georef.untrusted.damage import DamagedFile, decoding
@@ -235,9 +236,12 @@ class Gltf:
     def solid_arrays(self, mesh: int = 0) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return positions and triangles of a mesh with its seams merged.
 
-        By EXT_mesh_manifold if the file has it, else by merging equal positions of all primitives.
+        By EXT_mesh_manifold if the file has it, else by merging equal positions of all primitives. Outlines have no
+        seams: theirs are returned as they are.
         """
         item = self.item("meshes", mesh)
+        if outline_form(item) and len(item["primitives"]) == 1:
+            return self.mesh_arrays(mesh)
         extension = item.get("extensions", {}).get("EXT_mesh_manifold")
         if extension is not None:
             primitive = extension["manifoldPrimitive"]
@@ -272,8 +276,17 @@ class Gltf:
             pending += [(child, matrix) for child in node.get("children", [])]
         return found
 
+    @property
+    def outlines(self) -> dict[int, str]:
+        """The meshes that are drawn contours, each with its form; see `exporters.gltf.outline`."""
+        forms = {index: outline_form(mesh) for index, mesh in enumerate(self.items("meshes"))}
+        return {index: form for index, form in forms.items() if form}
+
     def scene_vertices(self) -> NDArray[np.float64]:
-        """Return all vertices (N, 3) float64 of the default scene, y-up: the ASSET frame of files by fig2mesh."""
+        """Return all vertices (N, 3) float64 of the default scene, y-up: the ASSET frame of files by fig2mesh.
+
+        Those of outlines are among them.
+        """
         clouds = [np.empty((0, 3))]
         count = 0
         for mesh, matrix in self.instances():
@@ -285,11 +298,21 @@ class Gltf:
         return np.concatenate(clouds)
 
     def scene_solids(self) -> list[tuple[NDArray[Any], NDArray[Any]]]:
-        """Return positions and triangles of each mesh instance of the default scene, with seams merged."""
+        """Return positions and triangles of each mesh instance of the default scene but outlines, seams merged."""
+        outlines = self.outlines
+        return self._solids([each for each in self.instances() if each[0] not in outlines])
+
+    def scene_outlines(self) -> list[tuple[str, NDArray[Any], NDArray[Any]]]:
+        """Return form, positions and triangles of each outline in the default scene."""
+        forms = self.outlines
+        found = [each for each in self.instances() if each[0] in forms]
+        return [(forms[mesh], *arrays) for (mesh, _), arrays in zip(found, self._solids(found), strict=True)]
+
+    def _solids(self, instances: list[tuple[int, NDArray[np.float64]]]) -> list[tuple[NDArray[Any], NDArray[Any]]]:
         solids = []
         count = 0
         known: dict[int, tuple[NDArray[Any], NDArray[Any]]] = {}
-        for mesh, matrix in self.instances():
+        for mesh, matrix in instances:
             vertices, faces = known[mesh] = known[mesh] if mesh in known else self.solid_arrays(mesh)
             count = _counted(count, max(len(vertices), len(faces)))
             self._charge(vertices.size + faces.size)

@@ -86,7 +86,7 @@ DOCUMENT: dict[str, Any] = {
     "images": [{"bufferView": INDEX, "uri": str, "mimeType": str}],
     "textures": [{"source": INDEX, "sampler": INDEX}],
     "samplers": [dict],
-    "materials": [{"name": str, "pbrMetallicRoughness": {"baseColorFactor": Numbers(4)}}],
+    "materials": [{"name": str, "pbrMetallicRoughness": {"baseColorFactor": Numbers(4)}, "doubleSided": bool}],
     "skins": [{"inverseBindMatrices": INDEX, "joints": Required([INDEX])}],
     "animations": [
         {

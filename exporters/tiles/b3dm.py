@@ -94,7 +94,9 @@ def part_table(gltf: Gltf) -> dict[str, list[Any]]:
 
 
 def _batch_table(gltf: Gltf) -> dict[str, list[Any]]:
-    primitives = [each for mesh in gltf.items("meshes") for each in mesh["primitives"]]
+    outlines = gltf.outlines
+    solids = [mesh for index, mesh in enumerate(gltf.items("meshes")) if index not in outlines]
+    primitives = [each for mesh in solids for each in mesh["primitives"]]
     lists = [each.get("extensions", {}).get(MESH_FEATURES, {}).get("featureIds") or [{}] for each in primitives]
     whole = all(ids[0].get("propertyTable") == 0 and ids[0].get("attribute") == 0 for ids in lists)
     return part_table(gltf) if whole else {}

@@ -35,7 +35,7 @@ def tileset_facts(path: Path) -> dict[str, Any]:
         return facts | {"lods": [], "generator": document.get("asset", {}).get("generator")}
     for lod in lods:
         inside = gltf_facts(path.parent / unquote(lod["uri"]))
-        lod |= {key: inside[key] for key in ("vertices", "triangles", "texture_px", "solid")}
+        lod |= {key: inside[key] for key in ("vertices", "triangles", "texture_px", "solid", "outline")}
     placement = None
     if "transform" in document["root"]:
         extras = document.get("asset", {}).get("extras")

@@ -16,11 +16,12 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import quote
 
-from exporters.asset import Asset
+from exporters.asset import Asset, TexturedMesh, without_outline
 from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.gltf.glb import glb_bytes
@@ -33,10 +34,13 @@ TilesVersion = Literal["1.0", "1.1"]
 CONTENT_SUFFIXES: dict[TilesVersion, str] = {"1.0": ".b3dm", "1.1": ".glb"}
 """Suffix of content files, by version of 3D Tiles."""
 
+MAX_SCREEN_SPACE_ERROR_PX = 16
+"""Default maximumScreenSpaceError of CesiumJS: a tile is refined where its geometric error covers more pixels."""
+
 MIN_VISIBLE_HEIGHTS = 10.0
 """Warning threshold of the visible range, in heights of the figure: below it, the figure vanishes while still large."""
 
-VISIBLE_RANGE_PER_ERROR = 1080 / (16 * 2 * math.tan(math.radians(30)) * 1080 / 1920)
+VISIBLE_RANGE_PER_ERROR = 1080 / (MAX_SCREEN_SPACE_ERROR_PX * 2 * math.tan(math.radians(30)) * 1080 / 1920)
 """103.9: metres of distance per metre of geometric error at which CesiumJS stops drawing a tileset.
 
 It draws where error * height / (distance * 2 tan(fov_y / 2)) > 16 pixels; here for a screen of 1920 x 1080 and the
@@ -82,6 +86,7 @@ def write_tileset(
             f"cannot be combined with --profile {profile.name}, whose compression clients of 3D Tiles 1.0 cannot read"
         )
         raise ExportError("--tiles-version 1.0", finding, "omit one of them")
+    asset = with_visible_outlines(asset)
     document = tileset(asset, visible_from_m, version)
     folder.mkdir(parents=True, exist_ok=True)
     for lod in range(len(asset.lods)):
@@ -90,6 +95,20 @@ def write_tileset(
         (folder / name).write_bytes(b3dm_bytes(data, name) if version == "1.0" else data)
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)
     (folder / "tileset.json").write_bytes(text.encode() + b"\n")
+
+
+def with_visible_outlines(asset: Asset) -> Asset:
+    """Return the asset without the outlines of coarse levels that never show them: the line is narrower than a pixel.
+
+    A level of detail is shown where its geometric error covers at most `MAX_SCREEN_SPACE_ERROR_PX` pixels, so that a
+    sixteenth of its error is the smallest pixel. The finest level, which is also shown from nearby, keeps its outline.
+    """
+
+    def visible(mesh: TexturedMesh) -> TexturedMesh:
+        wide = mesh.outline is not None and mesh.outline.width_m >= mesh.deviation_m[1] / MAX_SCREEN_SPACE_ERROR_PX
+        return mesh if wide else without_outline(mesh)
+
+    return replace(asset, lods=(asset.lods[0], *(visible(mesh) for mesh in asset.lods[1:])))
 
 
 def tileset(asset: Asset, visible_from_m: float | None = None, version: TilesVersion = "1.1") -> dict[str, Any]:

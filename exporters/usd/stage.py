@@ -22,7 +22,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from exporters.asset import Asset
+from exporters.asset import Asset, without_outline
 from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.usd.mesh import define_material, define_mesh
@@ -115,7 +115,7 @@ def _write_layer(asset: Asset, path: Path, textures: list[str]) -> None:
 
 def _define_levels(stage: Any, prim: Any, asset: Asset, textures: list[str]) -> None:
     def define(lod: int) -> None:
-        mesh = define_mesh(stage, asset.lods[lod], asset.part_names)
+        mesh = define_mesh(stage, without_outline(asset.lods[lod]), asset.part_names)
         if asset.lods[lod].texture is not None:
             define_material(stage, mesh, textures[lod])
 

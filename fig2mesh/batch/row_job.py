@@ -148,6 +148,7 @@ def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) 
 def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance: Advance) -> dict[str, Any]:
     """Make the outputs, replacing the files `before`; return the entries of the record."""
     from exporters.placed_figure import figure_of
+    from exporters.tiles.tileset import with_visible_outlines
     from fig2mesh.conversion.convert import convert
     from fig2mesh.conversion.keys import key_of
     from fig2mesh.conversion.observer import Observer
@@ -166,10 +167,10 @@ def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance
             request, replace(drawn, name=task.title), sheet=row.sheet(), store=store, observer=Observer(advance)
         )
         advance("write")
-        outputs = _write(row, done.asset, before)
+        asset = with_visible_outlines(done.asset)
+        outputs = _write(row, asset, before)
         key = key_of(stage=MEASURES, model=done.run.results.keys["model"], evidence=request.evidence)
         measures = store.make(MEASURES, key, dict[str, Any], lambda: model_measures(done))
-    asset = done.asset
     record = {
         "inputs": row.inputs,
         "outputs": {name: digest for name, (_, digest) in outputs.items()},
