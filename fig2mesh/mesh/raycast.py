@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from exporters.asset import OutlineMesh, TexturedMesh
+from exporters.asset import OutlineMesh, Texture, TexturedMesh
 from exporters.sampling import sample
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.records import Mesh
@@ -128,8 +128,12 @@ class MeshCaster:
         own = self._solid_colours(replace(hits, corners=np.where(inked, 0, hits.corners)))
         if own is None:
             return None
-        on_outline = np.where(inked, hits.corners - len(self.mesh.vertices), 0)
-        return np.where(inked, interpolated(outline.colors, replace(hits, corners=on_outline)), own)
+        on_outline = replace(hits, corners=np.where(inked, hits.corners - len(self.mesh.vertices), 0))
+        if outline.uv is not None and self.mesh.texture is not None:
+            ink = _texture_colours(self.mesh.texture, interpolated(outline.uv, on_outline))
+        else:
+            ink = interpolated(outline.colors, on_outline)
+        return np.where(inked, ink, own)
 
     def _inked(self, hits: MeshHits) -> NDArray[np.bool_]:
         """(M,) bool: hits on the outline."""
@@ -138,9 +142,14 @@ class MeshCaster:
     def _solid_colours(self, hits: MeshHits) -> NDArray[np.floating] | None:
         mesh = self.mesh
         if mesh.texture is not None and mesh.uv is not None:
-            texels = sample(mesh.texture, interpolated(mesh.uv, hits))
-            return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
+            return _texture_colours(mesh.texture, interpolated(mesh.uv, hits))
         return None if mesh.colors is None else interpolated(mesh.colors, hits)
+
+
+def _texture_colours(texture: Texture, uv: NDArray[Any]) -> NDArray[np.floating]:
+    """(M, 3) sRGB 0-255 of a texture of one, three or four channels at (M, 2) texture coordinates."""
+    texels = sample(texture, uv)
+    return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
 
 
 def shown_vertices(mesh: TexturedMesh) -> NDArray[np.float32]:

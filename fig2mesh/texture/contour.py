@@ -21,6 +21,9 @@ Floats = NDArray[np.float64]
 MAX_WIDTH: Final = 0.06
 """Largest width of a line, FIGURE units: that of a felt-tip pen on a child's drawing."""
 
+MAX_USUAL: Final = 0.035
+"""Largest usual width of a pen's lines, FIGURE units; broader ones are areas, and the surface stays where it is."""
+
 STEP_PX: Final = 0.25
 """Distance between the samples of a profile, pixels."""
 
@@ -195,7 +198,7 @@ def _pens(profiles: _Profiles, shown: NDArray[np.bool_], px: float) -> Floats:
         start = int((ordered[half:] - ordered[: len(ordered) - half]).argmin())
         usual = float(np.exp(ordered[start : start + half + 1].mean()))
         alike = (widths <= SPREAD * usual) & (widths >= usual / SPREAD)
-        if members.sum() < least or alike.mean() < MIN_ALIKE:
+        if members.sum() < least or alike.mean() < MIN_ALIKE or usual > MAX_USUAL:
             continue
         thick = members & (width >= THICK_PX * px)
         if thick.sum() < 0.2 * members.sum():
