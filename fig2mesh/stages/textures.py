@@ -31,4 +31,4 @@ def textures(
         return unobserved_sides(body, lift, picture, frame, shipped())
 
     inferred = infer if textures == "network" else None
-    return make_sources(figure, frame, parts, texture_size, seed, inferred, contours=contours == "keep")
+    return make_sources(figure, frame, parts, texture_size, seed, inferred, contours=contours != "drop")

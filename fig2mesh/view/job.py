@@ -59,7 +59,7 @@ def scene_of(
     """Make the scene of a figure, with only the stages that it needs; advance : called with the name of each."""
     done = run_stages(figure, settings, (lift, body, textures), height_m=height_m, observer=Observer(advance))
     fields, sources, pose = done.results[body], done.results[textures], done.results[lift]
-    contours = settings.contours == "keep"
+    contours = settings.contours != "drop"
     return make_scene(done.figure.name, fields, sources, image_frame(done.figure), pose, height_m, contours)
 
 
