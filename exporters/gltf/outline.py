@@ -57,7 +57,7 @@ def outline_mesh(
         primitive["attributes"]["TEXCOORD_0"] = document.accessor(
             "outline texcoord", nowhere, ARRAY_BUFFER, "ATTRIBUTES", normalized=True
         )
-    primitive["material"] = _material(document, colors, primitive["attributes"], profile)
+    primitive["material"] = _material(document, outline.culled, colors, primitive["attributes"], profile)
     facts = {"form": HULL if outline.culled else RIBBON, "width_m": float(outline.width_m)}
     return document.add("meshes", {"name": OUTLINE, "primitives": [primitive], "extras": {OUTLINE: facts}})
 
@@ -68,7 +68,7 @@ def _ordered(outline: OutlineMesh, profile: Profile) -> tuple[NDArray[np.int64],
     return np.arange(len(outline.vertices)), outline.faces
 
 
-def _material(document: Document, colors: ByteArray, attributes: dict[str, int], profile: Profile) -> int:
+def _material(document: Document, culled: bool, colors: ByteArray, attributes: dict[str, int], profile: Profile) -> int:
     """Add the material, and to `attributes` what it needs; returns its index."""
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
     pens, pen = np.unique(colors, axis=0, return_inverse=True)
@@ -84,8 +84,8 @@ def _material(document: Document, colors: ByteArray, attributes: dict[str, int],
         attributes["COLOR_0"] = document.accessor(
             "outline color", linear_rgba(colors), ARRAY_BUFFER, "ATTRIBUTES", normalized=True
         )
-    # The faces of a ribbon are doubled, those of a hull must be culled. `false` is the default; written for readers.
-    item: dict[str, Any] = {"name": OUTLINE, "pbrMetallicRoughness": surface, "doubleSided": False}
+    # A ribbon has faces on both sides, as some clients ignore this flag; Blender removes those on the back as duplicates.
+    item: dict[str, Any] = {"name": OUTLINE, "pbrMetallicRoughness": surface, "doubleSided": not culled}
     if profile.extensions:
         document.used.add("KHR_materials_unlit")
         item["extensions"] = {"KHR_materials_unlit": {}}
