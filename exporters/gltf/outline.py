@@ -84,7 +84,7 @@ def _material(document: Document, culled: bool, colors: ByteArray, attributes: d
         attributes["COLOR_0"] = document.accessor(
             "outline color", linear_rgba(colors), ARRAY_BUFFER, "ATTRIBUTES", normalized=True
         )
-    # A ribbon has faces on both sides, as some clients ignore this flag; Blender removes those on the back as duplicates.
+    # A ribbon has faces on its back too, as some clients ignore this flag; Blender removes them as duplicates.
     item: dict[str, Any] = {"name": OUTLINE, "pbrMetallicRoughness": surface, "doubleSided": not culled}
     if profile.extensions:
         document.used.add("KHR_materials_unlit")
