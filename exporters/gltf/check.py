@@ -248,18 +248,17 @@ def _check_solid(gltf: Gltf, index: int, where: str) -> list[Finding]:
 def _check_outline(gltf: Gltf, index: int, where: str) -> list[Finding]:
     """Check a drawn contour: a hull must be a solid turned inside out, a ribbon visible from both sides.
 
-    Either way its material must be one-sided: with both sides shown, a hull hides the figure.
+    The material of a hull must be one-sided: with both sides shown, it hides the figure.
     """
     vertices, faces = gltf.solid_arrays(index)
-    if gltf.outlines[index] == HULL:
-        findings = check_solid(vertices, faces[:, ::-1], where)
-    elif count := unmatched_edges(merged_by_position(vertices, faces)[1]):
-        findings = [Finding("error", "ONE_SIDED", f"{count} edges of the ribbon without a triangle behind", where)]
-    else:
-        findings = []
+    if gltf.outlines[index] != HULL:
+        count = unmatched_edges(merged_by_position(vertices, faces)[1])
+        message = f"{count} edges of the ribbon without a triangle behind"
+        return [Finding("error", "ONE_SIDED", message, where)] if count else []
+    findings = check_solid(vertices, faces[:, ::-1], where)
     for primitive in gltf.primitives(index):
         if "material" in primitive and gltf.item("materials", primitive["material"]).get("doubleSided"):
-            findings.append(Finding("error", "TWO_SIDED", "the outline's material is doubleSided", where))
+            findings.append(Finding("error", "TWO_SIDED", "the hull's material is doubleSided", where))
     return findings
 
 

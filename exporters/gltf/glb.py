@@ -107,9 +107,6 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
             shown = evidence(document, mesh)
             if shown is not None:
                 primitive["extensions"]["EXT_structural_metadata"] = shown
-        solid = manifold(document, mesh, corners, indices, attributes["POSITION"])
-        if solid is not None:
-            item["extensions"] = {"EXT_mesh_manifold": solid}
     elif mesh.parts is not None:
         # In core glTF: a custom attribute with the labels; their names are on the node.
         attributes["_PART"] = document.accessor("part", mesh.parts.astype(np.float32), ARRAY_BUFFER, "ATTRIBUTES")
@@ -117,8 +114,13 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
         node |= _node_extras(asset, mesh)
     document.add("meshes", item)
     if mesh.outline is not None:
-        drawn = outline_mesh(document, mesh.outline, outline, profile, shown is not None)
+        texcoord = attributes["TEXCOORD_0"] if shown is not None else None
+        drawn = outline_mesh(document, mesh.outline, outline, profile, texcoord)
         node["children"] = [document.add("nodes", {"name": OUTLINE, "mesh": drawn})]
+    # After all other accessors: VTK (9.7) drops the one with sparse indices, and miscounts those that follow.
+    solid = manifold(document, mesh, corners, indices, attributes["POSITION"]) if profile.extensions else None
+    if solid is not None:
+        item["extensions"] = {"EXT_mesh_manifold": solid}
     return document, mesh.texture
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from exporters.asset import ByteArray, FloatArray, IntArray, OutlineMesh, Texture
 from exporters.colour import linear_from_srgb
-from exporters.gltf.document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document, bounds, index_array
+from exporters.gltf.document import ARRAY_BUFFER, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER, Document, bounds, index_array
 from exporters.gltf.material import linear_rgba
 from exporters.gltf.meshopt import reordered_faces
 from exporters.gltf.part_features import CLAMP_TO_EDGE, NEAREST
@@ -24,6 +24,9 @@ from exporters.profiles import Profile
 
 OUTLINE = "outline"
 """Name of node, mesh and material, and of the extras of the mesh by which readers recognise it."""
+
+BYTES = {number: int(code[1:]) for code, number in COMPONENT_TYPES.items()}
+"""Bytes of a number, by componentType."""
 
 HULL, RIBBON = "hull", "ribbon"
 
@@ -37,12 +40,12 @@ def outline_form(mesh: dict[str, Any]) -> str:
 
 
 def outline_mesh(
-    document: Document, outline: OutlineMesh, positions: NDArray[Any], profile: Profile, property_texture: bool
+    document: Document, outline: OutlineMesh, positions: NDArray[Any], profile: Profile, texcoord: int | None
 ) -> int:
     """Add the mesh of an outline; returns its index.
 
     positions : (N, 3) of `outline.vertices`, float32, or quantised for the same transform as the figure's
-    property_texture : whether the document has one
+    texcoord : accessor of the figure's texture coordinates in documents with property textures
     """
     order, faces = _ordered(outline, profile)
     positions, colors = positions[order], outline.colors[order]
@@ -51,15 +54,25 @@ def outline_mesh(
     more = bounds(positions) | ({"normalized": True} if positions.dtype.kind == "u" else {})
     position = document.accessor("outline position", positions, ARRAY_BUFFER, "ATTRIBUTES", **more)
     primitive: dict[str, Any] = {"attributes": {"POSITION": position}, "indices": indices, "mode": 4}
-    if property_texture:
-        # CesiumJS (1.140) samples the property textures of a document in every primitive, and fails without these.
-        nowhere = np.zeros((len(positions), 2), np.uint8)
-        primitive["attributes"]["TEXCOORD_0"] = document.accessor(
-            "outline texcoord", nowhere, ARRAY_BUFFER, "ATTRIBUTES", normalized=True
-        )
-    primitive["material"] = _material(document, colors, primitive["attributes"], profile)
+    if texcoord is not None:
+        primitive["attributes"]["TEXCOORD_0"] = _any_coordinates(document, texcoord, len(positions))
+    primitive["material"] = _material(document, outline.culled, colors, primitive["attributes"], profile)
     facts = {"form": HULL if outline.culled else RIBBON, "width_m": float(outline.width_m)}
     return document.add("meshes", {"name": OUTLINE, "primitives": [primitive], "extras": {OUTLINE: facts}})
+
+
+def _any_coordinates(document: Document, texcoord: int, count: int) -> int:
+    """Add texture coordinates of an outline that nothing shows; returns the index of their accessor.
+
+    CesiumJS (1.140) samples the property textures of a document in every primitive, and stops rendering at one without
+    coordinates. Those of the figure cost no bytes.
+    """
+    figure = document.json["accessors"][texcoord]
+    if count > figure["count"]:
+        return document.accessor("outline texcoord", np.zeros((count, 2), np.float32), ARRAY_BUFFER, "ATTRIBUTES")
+    # A view of several accessors must have a stride.
+    document.json["bufferViews"][figure["bufferView"]]["byteStride"] = 2 * BYTES[figure["componentType"]]
+    return document.add("accessors", figure | {"name": "outline texcoord", "count": count})
 
 
 def _ordered(outline: OutlineMesh, profile: Profile) -> tuple[NDArray[np.int64], IntArray]:
@@ -68,7 +81,7 @@ def _ordered(outline: OutlineMesh, profile: Profile) -> tuple[NDArray[np.int64],
     return np.arange(len(outline.vertices)), outline.faces
 
 
-def _material(document: Document, colors: ByteArray, attributes: dict[str, int], profile: Profile) -> int:
+def _material(document: Document, culled: bool, colors: ByteArray, attributes: dict[str, int], profile: Profile) -> int:
     """Add the material, and to `attributes` what it needs; returns its index."""
     surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
     pens, pen = np.unique(colors, axis=0, return_inverse=True)
@@ -84,8 +97,8 @@ def _material(document: Document, colors: ByteArray, attributes: dict[str, int],
         attributes["COLOR_0"] = document.accessor(
             "outline color", linear_rgba(colors), ARRAY_BUFFER, "ATTRIBUTES", normalized=True
         )
-    # The faces of a ribbon are doubled, those of a hull must be culled. `false` is the default; written for readers.
-    item: dict[str, Any] = {"name": OUTLINE, "pbrMetallicRoughness": surface, "doubleSided": False}
+    # A ribbon has faces on its back too, as some clients ignore this flag; Blender removes them as duplicates.
+    item: dict[str, Any] = {"name": OUTLINE, "pbrMetallicRoughness": surface, "doubleSided": not culled}
     if profile.extensions:
         document.used.add("KHR_materials_unlit")
         item["extensions"] = {"KHR_materials_unlit": {}}
