@@ -14,6 +14,8 @@ from fig2mesh.parts.cross_section import CrossSection, measure_cross_section
 from fig2mesh.parts.depth import mid_surface, place_limb
 from fig2mesh.parts.distances import closing
 from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
+from fig2mesh.parts.head_frame import HeadFrame, head_frame
+from fig2mesh.parts.heads import RaisedHead, raise_head
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.limbs import Limb
@@ -77,7 +79,7 @@ def raise_layers(
     props = [layer for layer in others if layer.limb is None]
     bones = core_bones(canvas, divided, joints)
     flat = _may_end_flat(canvas, divided, joints)
-    make = _Inflation(canvas, loads, flat, device, fields)
+    make = _Inflation(canvas, loads, flat, device, fields, head_frame(canvas, joints))
     surfaces = [make(core, bones)]
     layers: list[Layer] = [core]
     limbs: list[Limb | None] = [None]
@@ -123,9 +125,12 @@ class _Inflation:
         flat: NDArray[np.uint8],
         device: str,
         fields: tuple[PartSdf, ...],
+        frame: HeadFrame,
     ) -> None:
         self.canvas, self.loads, self.flat, self.device, self.fields = canvas, loads, flat, device, fields
+        self.frame = frame
         self.cross_sections: dict[str, CrossSection | None] = {}
+        self.heads: dict[str, RaisedHead | None] = {}
 
     def __call__(self, layer: Layer, bones: Bones) -> LayerSurface:
         canvas = self.canvas
@@ -137,11 +142,15 @@ class _Inflation:
         cross_section = self.cross_sections[layer.name]
         ends = flat_ends(canvas, layer.region, np.isin(layer.labels, self.flat))
         rim = rim_distance(canvas, layer.region, ends)
-        u = self._raised(layer.region, layer.labels, bones, ends, rim)
+        head = self._head(layer, rim[: len(layer.region)])
+        u = self._raised(layer.region, layer.labels, bones, ends, rim, head)
         u = extended(rim[: len(u)], u, canvas.pitch)
         z0 = mid_surface(canvas, bones.points, bones.depth)
         if cross_section is not None:
-            u, z0 = u * cross_section.ratio, z0 + cross_section.offset
+            ratio = cross_section.ratio if head is None else head.bounded_ratio(cross_section.ratio)
+            u, z0 = u * ratio, z0 + cross_section.offset
+        if head is not None and head.brim.any():
+            u = extended(rim[: len(u)], np.where(rim[: len(u)] < 0, np.maximum(u, head.brim), 0.0), canvas.pitch)
         return LayerSurface(u, z0, layer.labels, None if ends is None else clip_distance(canvas, layer.region, ends))
 
     def _raised(
@@ -151,6 +160,7 @@ class _Inflation:
         bones: Bones,
         ends: Ends | None,
         rim: NDArray[np.float64],
+        head: RaisedHead | None,
     ) -> NDArray[np.float64]:
         """(H, W) squared half thickness of an inflated outline, FIGURE units²; 0 outside its `rim_distance`."""
         height = len(region)
@@ -164,7 +174,16 @@ class _Inflation:
         u = inflate(rim < 0, load, self.device, rim)[:height] * self.canvas.pitch**2
         if (labels == PART["head"]).any():
             u = self._without_grooves(region[:height], labels[:height], u, rim[:height])
+        if head is not None:
+            u = np.where(rim[:height] < 0, head.joined(u), 0.0)
         return np.asarray(u * (1.0 + np.maximum(steep, 0.0)))
+
+    def _head(self, layer: Layer, rim: NDArray[np.float64]) -> RaisedHead | None:
+        if layer.name != "core":
+            return None
+        if layer.name not in self.heads:
+            self.heads[layer.name] = raise_head(self.canvas, self.frame, layer.region, layer.labels, rim, self.device)
+        return self.heads[layer.name]
 
     def _without_grooves(
         self, region: NDArray[np.bool_], labels: NDArray[np.uint8], u: NDArray[np.float64], rim: NDArray[np.float64]
@@ -191,7 +210,8 @@ class _Inflation:
         own = [field for field in self.fields if (layer.labels == field.part).any()]
         if not own:
             return None
-        reference = self._raised(layer.region, layer.labels, bones, None, rim_distance(canvas, layer.region, None))
+        rim = rim_distance(canvas, layer.region, None)
+        reference = self._raised(layer.region, layer.labels, bones, None, rim, self._head(layer, rim))
         bone = mid_surface(canvas, bones.points, bones.depth)
         return measure_cross_section(canvas, layer.labels, own, reference, bone)
 
