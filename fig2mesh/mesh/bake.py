@@ -56,7 +56,7 @@ def bake(
     size: int,
     body: Body | None = None,
     inset: FloatArray | None = None,
-    bare: FloatArray | None = None,
+    bare: ByteArray | None = None,
     ribbon: Mesh | None = None,
 ) -> Baked:
     """Bake the atlas of a mesh in FIGURE.
@@ -87,7 +87,9 @@ def bake(
     color[visible] = drawn_colours(sources, frame, shown[visible])
     if bare is not None:
         share = slant(normal[visible, 2])[:, None]
-        color[visible] += share * (_bilinear(bare, frame.image_from_figure(shown[visible])) - color[visible])
+        color[visible] += share * (
+            _bilinear(bare.astype(np.float32), frame.image_from_figure(shown[visible])) - color[visible]
+        )
     hidden = ~visible
     color[hidden] = plain_colours(sources, frame, points[hidden], normal[hidden], face_parts[face[hidden]], body)
     image = np.zeros((size, size, 3), np.uint8)

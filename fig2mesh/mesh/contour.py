@@ -14,10 +14,10 @@ from fig2mesh.mesh.contour_mesh import ContourMesh, hull, ribbon
 from fig2mesh.mesh.inset import continued_over, inset, steady
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.mesh.rim import Rim, rim_of
-from fig2mesh.records import Figure, FloatArray, Mesh
+from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh
 from fig2mesh.settings import Contours
 from fig2mesh.texture.bare import without_line
-from fig2mesh.texture.contour import drawn_line
+from fig2mesh.texture.contour import drawn_line, paper_beside
 from fig2mesh.texture.sources import continued
 
 Floats = NDArray[np.float64]
@@ -50,29 +50,26 @@ class Contour:
 
     levels : finest first
     width : median width of the line, FIGURE units; 0 where none is drawn
-    bare : (H, W, 3) float32 sRGB 0-255, the drawing without it, continued beyond the silhouette; None where none is
-        drawn
+    bare : (H, W, 3) uint8 sRGB, the drawing without it, continued beyond the silhouette; None where none is drawn
     """
 
     levels: tuple[ContourLevel, ...]
     width: float
-    bare: NDArray[np.float32] | None
+    bare: ByteArray | None
 
 
-def contour_of(
-    figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body: Body, contours: Contours
-) -> Contour:
+def contour_of(figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body: Body, contours: Contours) -> Contour:
     """Contour of a figure, read off the drawing along the rim of its meshes.
 
     meshes : levels of detail, FIGURE; contours : "drop" leaves the surfaces where they are and makes no line
     """
-    picture = continued(figure.rgba, figure.mask)
+    picture, paper = continued(figure.rgba, figure.mask), paper_beside(figure.rgba, figure.mask)
     levels, width, bare = [], 0.0, None
     for mesh in meshes:
         normals = vertex_normals(mesh, body)
         rim = rim_of(mesh, normals)
         shown = _unobstructed(mesh, rim, rim.points)
-        line = drawn_line(picture, frame, rim.points, rim.outwards, shown)
+        line = drawn_line(picture, frame, rim.points, rim.outwards, shown, paper)
         drawn = line.width > 0
         if not drawn.any():
             levels.append(ContourLevel(mesh.vertices, None))
@@ -101,8 +98,8 @@ def contour_of(
 
 
 def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats, body: Body) -> Floats:
-    """(N,) width of the ribbon: none where it would be seen from the front and nothing is drawn, and none where it would
-    leave the body: on flat soles and hems the rim wanders, and its normal with it."""
+    """(N,) width of the ribbon: 0 where it would be seen from the front and nothing is drawn, and where it would leave
+    the body: on flat soles and hems the rim wanders, and its normal with it."""
     inwards = np.append(-rim.outwards, np.zeros((len(taken), 1)), axis=1)
     middle, end = (rim.points + share * taken[:, None] * inwards for share in (0.5, 1.0))
     bare = ~(steady(rim, drawn) > 0) & _unobstructed(mesh, rim, middle)

@@ -28,7 +28,11 @@ MIN_WIDTH: Final = 0.1
 
 @dataclass(frozen=True)
 class ContourMesh:
-    """mesh : FIGURE; colors : (V, 3) uint8 sRGB; culled : an inverted hull, of which clients must draw front sides only."""
+    """Line as a mesh.
+
+    mesh : FIGURE; colors : (V, 3) uint8 sRGB
+    culled : whether it is an inverted hull, of which clients must draw the front sides only
+    """
 
     mesh: Mesh
     colors: NDArray[np.uint8]

@@ -3,7 +3,7 @@
 On a smooth surface the rim is where the normal is at right angles to the line of sight. Here it is where normals that
 are interpolated along the edges are: a closed polyline with a corner on every edge that it crosses.
 
-DeCarlo et al. 2003, "Suggestive contours for conveying shape"; Hertzmann and Zorin 2000, "Illustrating smooth surfaces".
+Hertzmann and Zorin 2000, "Illustrating smooth surfaces".
 """
 
 from __future__ import annotations
@@ -58,9 +58,7 @@ def rim_of(mesh: Mesh, normals: FloatArray) -> Rim:
     edges = ordered.reshape(-1, 2)[first]
     start, end = z[edges[:, 0]], z[edges[:, 1]]
     share = np.clip(start / np.where(start == end, 1.0, start - end), 0.0, 1.0)
-    rim = Rim(
-        edges.astype(np.int32), share, np.empty((0, 3)), np.empty((0, 2)), index.reshape(-1, 2).astype(np.int32)
-    )
+    rim = Rim(edges.astype(np.int32), share, np.empty((0, 3)), np.empty((0, 2)), index.reshape(-1, 2).astype(np.int32))
     flat = rim.at(normals[:, :2])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
     return Rim(rim.edges, share, rim.at(mesh.vertices), flat, rim.segments)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from fig2mesh.field.body import Body
@@ -12,6 +14,7 @@ from fig2mesh.mesh.contour import Contour, ContourLevel
 from fig2mesh.mesh.contour_mesh import front_of
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.records import Figure, Mesh, UvMesh
+from fig2mesh.settings import Contours
 from fig2mesh.stages.unwrap import texels_of_level
 from fig2mesh.texture.sources import Sources
 
@@ -23,10 +26,13 @@ def bake(
     unwrap: tuple[UvMesh, ...],
     contour: Contour,
     *,
+    contours: Contours,
     texture_size: int,
 ) -> tuple[Baked, ...]:
     """Colour of each texel, and its observed mask."""
     frame = image_frame(figure)
+    if contours == "drop" and contour.bare is not None:
+        textures = replace(textures, seen=contour.bare.astype(np.float32))
     return tuple(
         bake_mesh(
             mesh,

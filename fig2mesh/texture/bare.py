@@ -29,8 +29,8 @@ def without_line(
     points: NDArray[np.float64],
     width: NDArray[np.float64],
     color: NDArray[np.float64],
-) -> NDArray[np.float32]:
-    """(H, W, 3) picture in which the line along the rim has the colours beside it.
+) -> NDArray[np.uint8]:
+    """(H, W, 3) sRGB, a picture in which the line along the rim has the colours beside it.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def without_line(
     """
     drawn = width > 0
     if not drawn.any():
-        return picture
+        return np.asarray(np.clip(np.round(picture), 0, 255), np.uint8)
     places = frame.image_from_figure(points[drawn])
     local_px = width[drawn] / frame.units_per_px
     reach = float(local_px.max()) + SOFT_PX
@@ -60,4 +60,5 @@ def without_line(
     limit = np.zeros(mask.shape)
     limit[rows, columns] = MAX_FILL * local + SOFT_PX
     replaced = (inked & (away <= limit)) | (~mask & (away <= reach))
-    return np.where(replaced[..., None], picture[tuple(source)], picture).astype(np.float32)
+    result = np.where(replaced[..., None], picture[tuple(source)], picture)
+    return np.asarray(np.clip(np.round(result), 0, 255), np.uint8)

@@ -58,7 +58,10 @@ MIN_SHARE: Final = 0.08
 """Least share of the rim drawn with a pen."""
 
 MIN_DRAWN: Final = 0.25
-"""Least share of the rim with a line, of all pens, for a drawing with a contour; less is shading or the edge of a scan."""
+"""Least share of the rim with a line, of all pens, for a drawing with a contour; less is shading, or a scan's edge."""
+
+MIN_LIGHT_PX: Final = 2.0
+"""Least usual width of light lines, pixels."""
 
 THICK_PX: Final = 2.5
 """Width of lines, pixels, from which their darkest point has the pen's pure colour."""
@@ -101,6 +104,7 @@ def drawn_line(
     points: Floats,
     outwards: Floats,
     shown: NDArray[np.bool_],
+    paper: Floats | None = None,
 ) -> DrawnLine:
     """Line along the rim of a figure.
 
@@ -109,24 +113,53 @@ def drawn_line(
     picture : (H, W, 3) sRGB 0-255, its colours continued beyond the silhouette
     points : (N, 2 or 3) of the rim, FIGURE; outwards : (N, 2) unit normals in the picture's plane
     shown : (N,) bool; False where something in front hides the rim
+    paper : (3,) sRGB 0-255 beside the figure, of which a silhouette may have a strip; None for cut-out figures
     """
-    profiles = _read(picture, frame, points[:, :2], outwards)
+    line = _dark_line(picture, frame, points[:, :2], outwards, shown)
+    if len(line.pens):
+        return line
+    # White ink on dark fills: the same in the negative. Cut-out figures have a light fringe of a pixel.
+    light = _dark_line(255 - picture, frame, points[:, :2], outwards, shown, MIN_LIGHT_PX * frame.units_per_px)
+    pens = 255 - light.pens
+    if paper is not None and len(pens) and (np.linalg.norm(pens - paper, axis=1) < ALIKE).any():
+        return line
+    return DrawnLine(light.width, 255 - light.color, pens)
+
+
+def paper_beside(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> Floats | None:
+    """(3,) median sRGB 0-255 of the opaque pixels beside a silhouette (H, W); None where there are none."""
+    beside = ndimage.binary_dilation(mask, iterations=8) & ~ndimage.binary_dilation(mask, iterations=2)
+    beside &= rgba[..., 3] >= 250
+    return np.asarray(np.median(rgba[beside][:, :3], axis=0), np.float64) if beside.any() else None
+
+
+def _dark_line(
+    picture: NDArray[np.float32],
+    frame: ImageFrame,
+    points: Floats,
+    outwards: Floats,
+    shown: NDArray[np.bool_],
+    min_usual: float = 0.0,
+) -> DrawnLine:
+    """Line that is darker than what lies beside it; min_usual : least usual width of a pen, FIGURE units."""
+    profiles = _read(picture, frame, points, outwards)
     pens = _pens(profiles, shown, frame.units_per_px)
+    pens = pens[pens[:, 3] >= min_usual]
     width = np.zeros(len(points))
     color = np.zeros((len(points), 3))
-    if len(pens):
-        apart = np.linalg.norm(profiles.ink[:, None] - pens[:, 0:3], axis=-1)
-        nearest = apart.argmin(axis=1)
-        pure = apart[np.arange(len(points)), nearest] <= ALIKE
-        thin = profiles.width <= THICK_PX * frame.units_per_px
-        inked = pure | (thin & _mixed(profiles, pens[nearest, :3]))
-        usual = pens[nearest, 3]
-        ends = inked & (profiles.width <= 1.5 * SPREAD * usual) & (profiles.rise >= DARKER)
-        width = np.where(ends, profiles.width, np.where(inked, np.nan, 0.0))
-        color = pens[nearest, :3]
-        width[~shown] = np.nan
-        if (pure & (width > 0)).sum() < MIN_DRAWN * max(int(shown.sum()), 1):
-            return DrawnLine(np.zeros(len(points)), color, pens[:0, :3])
+    if not len(pens):
+        return DrawnLine(width, color, pens[:, :3])
+    apart = np.linalg.norm(profiles.ink[:, None] - pens[:, :3], axis=-1)
+    nearest = apart.argmin(axis=1)
+    color = pens[nearest, :3]
+    pure = apart[np.arange(len(points)), nearest] <= ALIKE
+    thin = profiles.width <= THICK_PX * frame.units_per_px
+    inked = pure | (thin & _mixed(profiles, color))
+    ends = inked & (profiles.width <= 1.5 * SPREAD * pens[nearest, 3]) & (profiles.rise >= DARKER)
+    width = np.where(ends, profiles.width, np.where(inked, np.nan, 0.0))
+    width[~shown] = np.nan
+    if (pure & (width > 0)).sum() < MIN_DRAWN * max(int(shown.sum()), 1):
+        return DrawnLine(np.zeros(len(points)), color, pens[:0, :3])
     return DrawnLine(width, color, pens[:, :3])
 
 
