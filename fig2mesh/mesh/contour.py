@@ -25,11 +25,11 @@ Floats = NDArray[np.float64]
 WIDER, SOFT_PX = 1.1, 0.75
 """Width of the ribbon relative to the line's, and what is added for its soft edge, pixels."""
 
+MAX_OUTSIDE = 0.1
+"""Largest distance of the ribbon's inner edge off the surface, relative to its width."""
+
 MIN_TAKEN = 0.6
 """Least share of a line's width by which the surface is inset for the line to be taken off it: the rest would show."""
-
-MIN_DEPTH = 0.25
-"""Least depth of the ribbon's inner edge below the surface, relative to its width."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats, body: Body) ->
     inwards = np.append(-rim.outwards, np.zeros((len(taken), 1)), axis=1)
     middle, end = (rim.points + share * taken[:, None] * inwards for share in (0.5, 1.0))
     bare = ~(steady(rim, drawn) > 0) & _unobstructed(mesh, rim, middle)
-    outside = body.distance(end.astype(np.float32)) > -MIN_DEPTH * taken
+    outside = body.distance(end.astype(np.float32)) > MAX_OUTSIDE * taken
     return np.where(bare | outside, 0.0, taken)
 
 

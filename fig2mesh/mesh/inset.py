@@ -32,10 +32,13 @@ STIFFNESS: Final = 0.5
 MAX_OF_THICKNESS: Final = 0.35
 """Largest inset relative to the thickness of the solid: both sides move."""
 
+CLEARANCE: Final = 1e-3
+"""Distance below the surface at which rays start, FIGURE units: they must not hit the triangles they start from."""
+
 SMOOTHING: Final = 2
 """Passes over the directions of the inset; sharp creases would fold without."""
 
-TURNED: Final = 0.2
+TURNED: Final = 0.4
 """Threshold of the cosine between a triangle's normals before and after, below which its inset is reduced."""
 
 ATTEMPTS: Final = 24
@@ -63,7 +66,7 @@ def steady(rim: Rim, values: Floats) -> Floats:
 
 
 def continued_over(mesh: Mesh, rim: Rim, readings: Floats) -> Floats:
-    """(V, K) values at the vertices from readings (N, K) on the rim, rows with NaN left out; zero where there are none."""
+    """(V, K) values at the vertices from readings (N, K) on the rim, rows with NaN left out; 0 where there are none."""
     known = np.isfinite(readings).all(axis=1)
     count = len(mesh.vertices)
     if not known.any():
@@ -92,7 +95,7 @@ def thickness(mesh: Mesh, inwards: Floats) -> Floats:
     for first, second in ((0.0, 0.0), (0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)):
         way = inwards + first * across + second * third
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-        start = mesh.vertices + 1e-4 * inwards
+        start = mesh.vertices + CLEARANCE * inwards
         rays = np.concatenate([start, way], axis=1).astype(np.float32)
         found = scene.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy().astype(np.float64)
         result = np.minimum(result, found)

@@ -52,8 +52,8 @@ def without_line(
     rows, columns = np.nonzero(near & mask)
     distance, index = cKDTree(places).query(np.stack([columns + 0.5, rows + 0.5], axis=1))
     local = local_px[index]
-    dark = np.linalg.norm(picture[rows, columns] - color[drawn][index], axis=1) < INKY
     inked = np.zeros(mask.shape, bool)
+    dark = np.linalg.norm(picture[rows, columns] - color[drawn][index], axis=1) < INKY
     chosen = dark & (distance <= local + SOFT_PX)
     inked[rows[chosen], columns[chosen]] = True
     away, source = ndimage.distance_transform_edt(inked | ~mask, return_indices=True)
