@@ -100,13 +100,14 @@ def _model(path: Path) -> GlobeAsset:
         raise InputError(path, "has no place on the earth", "write it with --lonlat, or give 3D Tiles or CZML")
     place = placement_of_record(record)
     uris = [item["uri"] for kind in ("buffers", "images") for item in gltf.items(kind) if "uri" in item]
+    outlines = gltf.outlines
     facts = {
         "name": path.stem,
         "credit": gltf.document.get("asset", {}).get("copyright", ""),
         "metadata": gltf.extras.get("metadata", {}),
         # CesiumJS rotates models so that they face east at heading 0.
         "place": record | {"entity_heading_deg": cesium_entity_heading_deg(place)},
-        "triangles": sum(_triangles(gltf, mesh) for mesh, _ in gltf.instances()),
+        "triangles": sum(_triangles(gltf, mesh) for mesh, _ in gltf.instances() if mesh not in outlines),
     }
     return GlobeAsset("model", path.name, path.parent, _needed(path, uris), facts)
 

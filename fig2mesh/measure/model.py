@@ -9,7 +9,7 @@ the ASSET origin on the drawing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 from exporters.asset import ByteArray, Texture, TexturedMesh
 from exporters.colour import srgb_from_linear
 from exporters.errors import ExportError
+from exporters.gltf.outline import outline_form
+from exporters.gltf.outline_reader import read_outline
+from exporters.gltf.reader import read_gltf
 from exporters.solid import merged_by_position, solid_of, unit_normals
 from exporters.triangles.files import check_triangle_file
 from fig2mesh.mesh.preview import render_mesh, view_bounds
@@ -146,7 +149,7 @@ def shape_measures(mesh: TexturedMesh) -> dict[str, Any]:
 
 
 def load_textured(path: Path | str) -> TexturedMesh:
-    """Read a .glb, .gltf, .ply or .obj file with one mesh, by trimesh.
+    """Read a .glb, .gltf, .ply or .obj file with one mesh and perhaps its outline, by trimesh.
 
     Vertices at equal positions become one vertex of the solid; part labels, observed mask and levels of detail are
     not read. Raises ExportError where the file cannot be read or does not hold exactly one triangle mesh.
@@ -158,7 +161,9 @@ def load_textured(path: Path | str) -> TexturedMesh:
     try:
         scene = trimesh.load_scene(path, process=False)
         nodes = [scene.graph[name] for name in scene.graph.nodes_geometry]
-        return _textured(scene, nodes, Path(path))
+        solids = [node for node in nodes if not outline_form({"extras": scene.geometry[node[1]].metadata})]
+        mesh = _textured(scene, solids, Path(path))
+        return mesh if len(solids) == len(nodes) else _with_outline(mesh, Path(path))
     except ExportError:
         raise
     except Exception as error:  # the parsers of trimesh raise exceptions of many kinds
@@ -201,6 +206,11 @@ def _textured(scene: Any, nodes: list[Any], path: Path) -> TexturedMesh:
         texture=texture,
         colors=colors,
     )
+
+
+def _with_outline(mesh: TexturedMesh, path: Path) -> TexturedMesh:
+    surface, _ = merged_by_position(mesh.vertices, mesh.faces)
+    return replace(mesh, outline=read_outline(read_gltf(path), surface))
 
 
 def _srgb(stored: NDArray[Any]) -> ByteArray:

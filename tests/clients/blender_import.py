@@ -53,7 +53,9 @@ def facts(item: bpy.types.Object) -> dict:
         "uv": [layer.name for layer in mesh.uv_layers],
         "attributes": [each.name for each in mesh.attributes],
         "properties": plain(mesh),
+        "parent": item.parent.name if item.parent else None,
         "materials": [material.name if material else None for material in materials],
+        "culled": [material.use_backface_culling for material in materials if material],
         "textures": [list(size) for material in materials if material for size in images(material)],
         "faces_of_materials": [sum(face.material_index == i for face in mesh.polygons) for i in range(len(materials))],
     }

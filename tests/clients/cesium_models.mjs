@@ -1,7 +1,8 @@
 // What CesiumJS makes of glTF models: each alone in a scene without globe or sky, seen from the side it faces.
 //
 // stdin:  {browser, cesium, models: [file, ...], width, height}: a browser, the folder Build/Cesium, models on disk
-// stdout: [{file, radius, png, messages}, ...] or with `error` where CesiumJS refuses one
+// stdout: [{file, radius, outline, png, messages}, ...] or with `error` where CesiumJS refuses one; outline: whether there
+//         is a node of that name
 import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
@@ -70,7 +71,7 @@ async function show({ url, width, height }) {
   // The figure faces south, so look north.
   scene.camera.lookAt(center, new Cesium.HeadingPitchRange(0, 0, radius * 2.6));
   for (let i = 0; i < 3; i++) scene.render();
-  return { radius, png: scene.canvas.toDataURL().split(',')[1] };
+  return { radius, outline: Boolean(model.getNode('outline')), png: scene.canvas.toDataURL().split(',')[1] };
 }
 
 const found = [];

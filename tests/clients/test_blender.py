@@ -10,10 +10,12 @@ import pytest
 from PIL import Image
 
 from exporters.asset import Asset
+from exporters.profiles import profile_named
 from exporters.write import write
 from georef.placement import GeoPlacement
 from tests.blender import looked_at
 from tests.exporters.analytic import HEIGHT, RADIUS, asset, capsule
+from tests.exporters.outlined import hulled, ribboned
 
 COLOUR_TOLERANCE = 12
 """Of 255: 16 samples per pixel under a uniform sky leave some noise on lit surfaces."""
@@ -57,6 +59,23 @@ def test_size_orientation_material_and_picture(tmp_path: Path, suffix: str) -> N
         np.testing.assert_allclose(np.median(patch, axis=0), expected, atol=COLOUR_TOLERANCE)
     assert np.median(picture[110:130, 75:85, 0]) > 128 + COLOUR_TOLERANCE, "the figure's left is at the right"
     assert np.median(picture[110:130, 35:45, 0]) < 128 - COLOUR_TOLERANCE
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", [None, "blender"])
+@pytest.mark.parametrize("form", ["hull", "ribbon"])
+def test_an_outline_is_an_object_of_its_own(tmp_path: Path, form: str, profile: str | None) -> None:
+    mesh = hulled(capsule(32, 8)) if form == "hull" else ribboned(capsule(32, 8))
+    assert mesh.outline is not None
+    path = tmp_path / "figure.glb"
+    write(asset(lods=(mesh,)), path, profile=profile_named(profile))
+    figure, outline = sorted(looked_at(path)["meshes"], key=lambda each: str(each["name"]))
+    assert (figure["name"], figure["faces"], figure["materials"]) == ("farmer", len(mesh.faces), ["drawing"])
+    assert (outline["name"], outline["parent"], outline["materials"]) == ("outline", "farmer", ["outline"])
+    # EEVEE culls the hull. Blender removes the faces on the back of the ribbon, whose others must not be culled then.
+    faces = len(mesh.outline.faces)
+    assert (outline["faces"], outline["culled"]) == ((faces, [True]) if form == "hull" else (faces // 2, [False]))
+    assert outline["properties"]["outline"]["form"] == form
 
 
 @pytest.mark.slow

@@ -25,6 +25,8 @@ from exporters.tiles.b3dm import read_b3dm
 from exporters.tiles.tileset import MAX_SCREEN_SPACE_ERROR_PX, with_visible_outlines
 from exporters.validate import validate
 from exporters.write import write
+from fig2mesh.measure.model import load_textured
+from fig2mesh.render.model import read_model
 from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule
 from tests.exporters.outlined import PENS, hulled, ribboned
 from tests.node import RunScript
@@ -78,6 +80,24 @@ def test_the_outline_comes_back(name: str, profile: str | None) -> None:
     else:
         assert unmatched_edges(outline.faces) == 0
         assert measure_topology(vertices, faces).volume == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("profile", [None, "blender", "qgis"])
+@pytest.mark.parametrize("name", FORMS)
+def test_a_file_read_back_has_the_same_outline(tmp_path: Path, name: str, profile: str | None) -> None:
+    given = outlined(name)
+    expected = given.mesh.outline
+    assert expected is not None
+    path = tmp_path / "a.glb"
+    write(given, path, profile=profile_named(profile))
+    found = load_textured(path)
+    assert found.outline is not None
+    for key in ("vertices", "faces", "colors"):
+        assert np.array_equal(getattr(found.outline, key), getattr(expected, key)), key
+    assert (found.outline.culled, found.outline.width_m) == (expected.culled, expected.width_m)
+    # The surface before the inset is not in the file.
+    assert np.array_equal(without_outline(found).vertices, found.vertices)
+    assert np.array_equal(read_model(path).faces, found.faces)
 
 
 @pytest.mark.parametrize("profile", PROFILES)

@@ -19,6 +19,7 @@ from PIL import Image
 from exporters.profiles import PROFILES, profile_named
 from exporters.write import write
 from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule
+from tests.exporters.outlined import hulled, ribboned
 from tests.node import ROOT, installed, runner
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -62,6 +63,33 @@ def test_cesiumjs_shows_compressed_models_like_plain_ones(
         assert ((other != 255).any(axis=2) ^ shown).sum() <= 2, model
         # WebP is lossless; ETC1S has four colours in a block of four by four texels, here of a steep ramp.
         assert np.abs(other - plain)[shown].mean() < (4.0 if "ktx2" in model else 0.5), model
+
+
+@pytest.mark.slow
+def test_cesiumjs_shows_outlines_without_hiding_the_figure(
+    tmp_path: Path, node_modules: Path, codecs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        pytest.skip(f"no browser ({', '.join(BROWSERS)}): CesiumJS not tried; apt-get install chromium")
+    monkeypatch.setenv("NODE_PATH", str(codecs))
+    shapes = {"bare": capsule(), "hull": hulled(capsule()), "ribbon": ribboned(capsule(), pens=2)}
+    models = []
+    for name in (None, "cesiumjs"):
+        for form, mesh in shapes.items():
+            path = tmp_path / f"{name} {form}.glb"
+            write(asset(ZURICH, lods=(mesh,)), path, profile=profile_named(name))
+            models.append(str(path))
+    run = runner(installed(ROOT / "build" / "browser", "playwright-core"))
+    cesium = str(node_modules / "cesium" / "Build" / "Cesium")
+    job = {"browser": browser, "cesium": cesium, "models": models, "width": 120, "height": 200}
+    found = run("cesium_models.mjs", stdin=job)
+    assert [(each.get("error"), each["messages"]) for each in found] == [(None, [])] * len(models)
+    assert [each["outline"] for each in found] == [False, True, True] * 2
+    bare = _pixels(found[0]["png"])
+    for each, model in zip(found[1:], models[1:], strict=True):
+        # Far from the line the figure is as without: nothing is in front of it.
+        assert np.abs(_pixels(each["png"]) - bare)[80:120, 50:70].mean() < 8, model
 
 
 @pytest.mark.parametrize("suffix", [".usdc", ".usdz"])
