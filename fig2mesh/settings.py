@@ -31,7 +31,7 @@ class Settings:
     parts : source of depths: networks, or rules and the outline alone
     textures : of sides that the drawing does not show: inferred by networks, or plain colours of what is drawn in
         front of them; none at all
-    contours : of the silhouette, if drawn: kept on the surface, or left to the client
+    contours : form of the line along the silhouette, if drawn: an inverted hull, a ribbon ("keep"), or none
     light : clients light the surface; without, they show its colours as they are
     normals : whether any output or effect needs shading normals, see `fig2mesh.conversion.plan`
     device : "cpu" or "cuda"

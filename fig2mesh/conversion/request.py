@@ -132,8 +132,9 @@ class InferenceOptions:
     )
     contours: Contours = option(
         default="keep",
-        help="keep: bake the line drawn round the figure into the texture; from the side it is a dark band. drop: "
-        "leave it out, for clients that draw outlines themselves.",
+        help="Form of the line drawn round the figure. keep: a ribbon along the silhouette, right in every client. "
+        "hull: an inverted hull, which shows the line from every side, for clients that cull back faces; others show "
+        "a black figure. drop: no line, for clients that draw outlines themselves.",
     )
     device: Device = option(default="auto", help="Device on which neural networks run.")
     seed: int = option(default=0, low=0, high=MAX_SEED, metavar="N", help="Seed of all random choices.")
