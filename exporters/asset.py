@@ -74,6 +74,8 @@ class OutlineMesh:
         silhouette, visible from both sides
     surface : (S, 3) float32, ASSET, metres: the vertices of the unsplit solid before they were inset
     width_m : median width of the line, metres
+    uv : (N, 2) float32, texture coordinates of a ribbon that shows the line as drawn, in the texture of its mesh; None:
+        the line has the pen's colour
     """
 
     vertices: FloatArray
@@ -82,12 +84,15 @@ class OutlineMesh:
     culled: bool
     surface: FloatArray
     width_m: float
+    uv: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen_array(self.vertices, np.float32, (None, 3), "vertices"))
         object.__setattr__(self, "faces", frozen_array(self.faces, np.int32, (None, 3), "faces"))
         count = len(self.vertices)
         object.__setattr__(self, "colors", frozen_array(self.colors, np.uint8, (count, 3), "colors"))
+        if self.uv is not None:
+            object.__setattr__(self, "uv", frozen_array(self.uv, np.float32, (count, 2), "uv"))
         object.__setattr__(self, "surface", frozen_array(self.surface, np.float32, (None, 3), "surface"))
         if not len(self.faces):
             raise ValueError("faces: empty; a mesh without a contour has no outline")
