@@ -115,7 +115,8 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
     document.add("meshes", item)
     if mesh.outline is not None:
         texcoord = attributes["TEXCOORD_0"] if shown is not None else None
-        drawn = outline_mesh(document, mesh.outline, outline, profile, texcoord)
+        texture = None if mesh.texture is None else 0
+        drawn = outline_mesh(document, mesh.outline, outline, profile, texture, texcoord)
         node["children"] = [document.add("nodes", {"name": OUTLINE, "mesh": drawn})]
     # After all other accessors: VTK (9.7) drops the one with sparse indices, and miscounts those that follow.
     solid = manifold(document, mesh, corners, indices, attributes["POSITION"]) if profile.extensions else None

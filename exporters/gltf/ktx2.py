@@ -68,7 +68,7 @@ def encode(texture: Texture) -> bytes:
 
 
 def padded(mesh: TexturedMesh) -> TexturedMesh:
-    """Pad the texture to sides of multiples of four: its last row and column are repeated, `uv` is scaled."""
+    """Pad the texture to sides of multiples of four: its last row and column are repeated, coordinates are scaled."""
     if mesh.texture is None or mesh.uv is None:
         return mesh
     height, width = mesh.texture.pixels.shape[:2]
@@ -82,7 +82,11 @@ def padded(mesh: TexturedMesh) -> TexturedMesh:
     # A mask of another size could not be padded proportionally.
     same = mesh.observed is not None and mesh.observed.pixels.shape[:2] == (height, width)
     observed = grown(mesh.observed) if mesh.observed is not None and same else None
-    return replace(mesh, texture=grown(mesh.texture), observed=observed, uv=mesh.uv * (width / wide, height / high))
+    shrink = (width / wide, height / high)
+    outline = mesh.outline
+    if outline is not None and outline.uv is not None:
+        outline = replace(outline, uv=outline.uv * shrink)
+    return replace(mesh, texture=grown(mesh.texture), observed=observed, uv=mesh.uv * shrink, outline=outline)
 
 
 def size_of(data: bytes) -> tuple[int, int]:

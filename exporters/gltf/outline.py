@@ -18,7 +18,7 @@ from exporters.asset import ByteArray, FloatArray, IntArray, OutlineMesh, Textur
 from exporters.colour import linear_from_srgb
 from exporters.gltf.document import ARRAY_BUFFER, COMPONENT_TYPES, ELEMENT_ARRAY_BUFFER, Document, bounds, index_array
 from exporters.gltf.material import linear_rgba
-from exporters.gltf.meshopt import reordered_faces
+from exporters.gltf.meshopt import quantised_uv, reordered_faces
 from exporters.gltf.part_features import CLAMP_TO_EDGE, NEAREST
 from exporters.profiles import Profile
 
@@ -40,11 +40,17 @@ def outline_form(mesh: dict[str, Any]) -> str:
 
 
 def outline_mesh(
-    document: Document, outline: OutlineMesh, positions: NDArray[Any], profile: Profile, texcoord: int | None
+    document: Document,
+    outline: OutlineMesh,
+    positions: NDArray[Any],
+    profile: Profile,
+    texture: int | None = None,
+    texcoord: int | None = None,
 ) -> int:
     """Add the mesh of an outline; returns its index.
 
     positions : (N, 3) of `outline.vertices`, float32, or quantised for the same transform as the figure's
+    texture : that of the figure, if it has one: it shows the line where the outline has texture coordinates
     texcoord : accessor of the figure's texture coordinates in documents with property textures
     """
     order, faces = _ordered(outline, profile)
@@ -54,11 +60,23 @@ def outline_mesh(
     more = bounds(positions) | ({"normalized": True} if positions.dtype.kind == "u" else {})
     position = document.accessor("outline position", positions, ARRAY_BUFFER, "ATTRIBUTES", **more)
     primitive: dict[str, Any] = {"attributes": {"POSITION": position}, "indices": indices, "mode": 4}
-    if texcoord is not None:
-        primitive["attributes"]["TEXCOORD_0"] = _any_coordinates(document, texcoord, len(positions))
-    primitive["material"] = _material(document, outline.culled, colors, primitive["attributes"], profile)
+    attributes = primitive["attributes"]
+    if outline.uv is not None and texture is not None:
+        attributes["TEXCOORD_0"] = _coordinates(document, outline.uv[order], profile)
+        shown: dict[str, Any] = {"baseColorTexture": {"index": texture}}
+    else:
+        if texcoord is not None:
+            attributes["TEXCOORD_0"] = _any_coordinates(document, texcoord, len(positions))
+        shown = _pens(document, colors, attributes, profile)
+    primitive["material"] = _material(document, outline.culled, shown, profile)
     facts = {"form": HULL if outline.culled else RIBBON, "width_m": float(outline.width_m)}
     return document.add("meshes", {"name": OUTLINE, "primitives": [primitive], "extras": {OUTLINE: facts}})
+
+
+def _coordinates(document: Document, uv: FloatArray, profile: Profile) -> int:
+    if not profile.compressed:
+        return document.accessor("outline texcoord", uv, ARRAY_BUFFER, "ATTRIBUTES")
+    return document.accessor("outline texcoord", quantised_uv(uv), ARRAY_BUFFER, "ATTRIBUTES", normalized=True)
 
 
 def _any_coordinates(document: Document, texcoord: int, count: int) -> int:
@@ -81,22 +99,26 @@ def _ordered(outline: OutlineMesh, profile: Profile) -> tuple[NDArray[np.int64],
     return np.arange(len(outline.vertices)), outline.faces
 
 
-def _material(document: Document, culled: bool, colors: ByteArray, attributes: dict[str, int], profile: Profile) -> int:
-    """Add the material, and to `attributes` what it needs; returns its index."""
-    surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": 1.0}
+def _pens(document: Document, colors: ByteArray, attributes: dict[str, int], profile: Profile) -> dict[str, Any]:
+    """Return the members of a material for the colours (N, 3) of vertices; adds what they need to `attributes`."""
     pens, pen = np.unique(colors, axis=0, return_inverse=True)
     if not profile.vertex_colors:
         # One texel for each pen, also where there is only one: QGIS shows nothing but textured surfaces unlit.
         attributes["TEXCOORD_0"] = document.accessor(
             "outline texcoord", _texel_centres(pen.reshape(-1), len(pens)), ARRAY_BUFFER, "ATTRIBUTES"
         )
-        surface["baseColorTexture"] = {"index": _palette(document, pens)}
-    elif len(pens) == 1:
-        surface["baseColorFactor"] = [*np.round(linear_from_srgb(pens[0] / 255.0), 6).tolist(), 1.0]
-    else:
-        attributes["COLOR_0"] = document.accessor(
-            "outline color", linear_rgba(colors), ARRAY_BUFFER, "ATTRIBUTES", normalized=True
-        )
+        return {"baseColorTexture": {"index": _palette(document, pens)}}
+    if len(pens) == 1:
+        return {"baseColorFactor": [*np.round(linear_from_srgb(pens[0] / 255.0), 6).tolist(), 1.0]}
+    attributes["COLOR_0"] = document.accessor(
+        "outline color", linear_rgba(colors), ARRAY_BUFFER, "ATTRIBUTES", normalized=True
+    )
+    return {}
+
+
+def _material(document: Document, culled: bool, shown: dict[str, Any], profile: Profile) -> int:
+    """Add the material; returns its index. shown : its colour or texture."""
+    surface = {**shown, "metallicFactor": 0.0, "roughnessFactor": 1.0}
     # A ribbon has faces on its back too, as some clients ignore this flag; Blender removes them as duplicates.
     item: dict[str, Any] = {"name": OUTLINE, "pbrMetallicRoughness": surface, "doubleSided": not culled}
     if profile.extensions:

@@ -20,6 +20,8 @@ from georef.untrusted.image_file import check_header
 def read_outline(gltf: Gltf, surface: NDArray[Any]) -> OutlineMesh | None:
     """Read the first outline of the default scene, ASSET; None in files without.
 
+    Of one that shows the texture of the figure, the first of the file, the pen's colours are sampled from that.
+
     surface : (S, 3) vertices of the solid in the file: what they were before they were inset is not recorded
 
     Raises DamagedFile for invalid data.
@@ -29,17 +31,21 @@ def read_outline(gltf: Gltf, surface: NDArray[Any]) -> OutlineMesh | None:
         return None
     form, vertices, faces = found[0]
     index = next(index for index, each in gltf.outlines.items() if each == form)
-    colors = _colors(gltf, gltf.primitives(index)[0], len(vertices))
+    primitive = gltf.primitives(index)[0]
+    uv = gltf.vectors(primitive["attributes"]["TEXCOORD_0"], 2) if _shows_figure_texture(gltf, primitive) else None
+    if uv is not None and (len(uv) != len(vertices) or not np.isfinite(uv).all()):
+        raise DamagedFile("texture coordinates of an outline that are not those of its vertices")
+    colors = _colors(gltf, primitive, len(vertices))
     width = gltf.item("meshes", index)["extras"][OUTLINE].get("width_m")
     if not isinstance(width, float | int) or not 0 <= width < np.inf or not np.isfinite(vertices).all():
         raise DamagedFile("an outline without a width, or with vertices that are not finite")
-    return OutlineMesh(vertices, faces.astype(np.int32), colors, form == HULL, surface, float(width))
+    return OutlineMesh(vertices, faces.astype(np.int32), colors, form == HULL, surface, float(width), uv)
 
 
 def _colors(gltf: Gltf, primitive: dict[str, Any], count: int) -> ByteArray:
     """(N, 3) sRGB colours of the vertices of an outline: of its texture, its vertices or its material."""
     attributes = primitive["attributes"]
-    surface = gltf.item("materials", primitive["material"])["pbrMetallicRoughness"] if "material" in primitive else {}
+    surface = _surface(gltf, primitive)
     if "COLOR_0" in attributes:
         colors = _bytes(np.atleast_2d(gltf.numbers(attributes["COLOR_0"]))[:, :3])
     elif isinstance(surface.get("baseColorTexture"), dict) and "TEXCOORD_0" in attributes:
@@ -49,6 +55,18 @@ def _colors(gltf: Gltf, primitive: dict[str, Any], count: int) -> ByteArray:
     if colors.shape != (count, 3):
         raise DamagedFile("colours of an outline that are not those of its vertices")
     return colors
+
+
+def _shows_figure_texture(gltf: Gltf, primitive: dict[str, Any]) -> bool:
+    reference = _surface(gltf, primitive).get("baseColorTexture")
+    first = isinstance(reference, dict) and reference.get("index") == 0 and "TEXCOORD_0" in primitive["attributes"]
+    return first and gltf.item("textures", 0).get("name") != OUTLINE  # else the colours of the pens
+
+
+def _surface(gltf: Gltf, primitive: dict[str, Any]) -> dict[str, Any]:
+    material = gltf.item("materials", primitive["material"]) if "material" in primitive else {}
+    surface: dict[str, Any] = material.get("pbrMetallicRoughness", {})
+    return surface
 
 
 def _texture(gltf: Gltf, reference: dict[str, Any]) -> Texture:

@@ -20,8 +20,11 @@ def hulled(mesh: TexturedMesh, width_m: float = 0.005, pens: int = 1) -> Texture
     return _inset(mesh, solid, outline)
 
 
-def ribboned(mesh: TexturedMesh, width_m: float = 0.005, pens: int = 1) -> TexturedMesh:
-    """The mesh inset by a width, with a ribbon round the silhouette seen from the front (+z), both sides of it."""
+def ribboned(mesh: TexturedMesh, width_m: float = 0.005, pens: int = 1, drawn: bool = False) -> TexturedMesh:
+    """The mesh inset by a width, with a ribbon round the silhouette seen from the front (+z), both sides of it.
+
+    drawn : whether it shows the texture of the mesh, which identifies its places
+    """
     solid = solid_of(mesh)
     surface = mesh.vertices[solid.first]
     inner = surface - width_m * mesh.shading_normals[solid.first]
@@ -30,7 +33,8 @@ def ribboned(mesh: TexturedMesh, width_m: float = 0.005, pens: int = 1) -> Textu
     a, b, c, d = np.arange(len(places)).reshape(4, -1)
     front = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     faces = np.concatenate([front, front[:, ::-1]])
-    return _inset(mesh, solid, OutlineMesh(places, faces, _colors(places, pens), False, surface, width_m))
+    uv = np.stack([0.5 + places[:, 0], 1 - places[:, 1] / places[:, 1].max()], axis=1) if drawn else None
+    return _inset(mesh, solid, OutlineMesh(places, faces, _colors(places, pens), False, surface, width_m, uv))
 
 
 def silhouette(surface: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -16,10 +16,12 @@ from exporters.asset import Asset, TexturedMesh, without_outline
 from exporters.colour import srgb_from_linear
 from exporters.figure_reader import read_figure
 from exporters.gltf.glb import glb_bytes, write_glb
+from exporters.gltf.ktx2 import padded
 from exporters.gltf.reader import Gltf, glb_of
 from exporters.inspect import inspect
 from exporters.placed_figure import figure_of
 from exporters.profiles import profile_named
+from exporters.sampling import sample
 from exporters.solid import measure_topology, unmatched_edges
 from exporters.tiles.b3dm import read_b3dm
 from exporters.tiles.tileset import MAX_SCREEN_SPACE_ERROR_PX, with_visible_outlines
@@ -27,7 +29,7 @@ from exporters.validate import validate
 from exporters.write import write
 from fig2mesh.measure.model import load_textured
 from fig2mesh.render.model import read_model
-from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule
+from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule, gradient_texture
 from tests.exporters.outlined import PENS, hulled, ribboned
 from tests.node import RunScript
 
@@ -36,6 +38,8 @@ FORMS: dict[str, TexturedMesh] = {
     "ribbon": ribboned(capsule()),
     "hull of two pens": hulled(capsule(), pens=2),
     "ribbon of two pens": ribboned(capsule(), pens=2),
+    "ribbon as drawn": ribboned(capsule(), drawn=True),
+    "ribbon as drawn, of a figure without texture": ribboned(capsule(texture=None, uv=None, observed=None), drawn=True),
     "hull of a figure without colours": hulled(capsule(texture=None, uv=None, observed=None, parts=None)),
 }
 PROFILES = (None, "cesiumjs", "blender", "qgis")
@@ -92,8 +96,16 @@ def test_a_file_read_back_has_the_same_outline(tmp_path: Path, name: str, profil
     write(given, path, profile=profile_named(profile))
     found = load_textured(path)
     assert found.outline is not None
-    for key in ("vertices", "faces", "colors"):
+    for key in ("vertices", "faces"):
         assert np.array_equal(getattr(found.outline, key), getattr(expected, key)), key
+    if name == "ribbon as drawn":
+        assert given.mesh.texture is not None
+        assert expected.uv is not None
+        assert np.array_equal(found.outline.uv, expected.uv)
+        assert np.array_equal(found.outline.colors, sample(given.mesh.texture, expected.uv))
+    else:
+        assert found.outline.uv is None
+        assert np.array_equal(found.outline.colors, expected.colors)
     assert (found.outline.culled, found.outline.width_m) == (expected.culled, expected.width_m)
     # The surface before the inset is not in the file.
     assert np.array_equal(without_outline(found).vertices, found.vertices)
@@ -116,7 +128,14 @@ def test_colours_of_the_pens(name: str, profile: str | None) -> None:
     assert "NORMAL" not in attributes
     # CesiumJS samples property textures, if there are any, in every primitive.
     property_textures = bool(gltf.extension("EXT_structural_metadata").get("propertyTextures"))
-    assert ("TEXCOORD_0" in attributes) == (property_textures or profile == "qgis")
+    assert ("TEXCOORD_0" in attributes) == (property_textures or profile == "qgis" or name == "ribbon as drawn")
+    if name == "ribbon as drawn":
+        # The texture of the figure, at the ribbon's own coordinates.
+        assert surface["baseColorTexture"] == gltf.item("materials", 0)["pbrMetallicRoughness"]["baseColorTexture"]
+        found = gltf.numbers(attributes["TEXCOORD_0"])
+        assert given.mesh.outline.uv is not None
+        assert np.sort(found, axis=0) == pytest.approx(np.sort(given.mesh.outline.uv, axis=0), abs=1e-5)
+        return
     pens = np.unique(given.mesh.outline.colors, axis=0)
     if profile == "qgis":
         source = gltf.item("textures", surface["baseColorTexture"]["index"])["source"]
@@ -253,6 +272,19 @@ def test_levels_whose_pixels_are_wider_than_the_line_have_no_outline() -> None:
     found = with_visible_outlines(asset(ZURICH, lods=levels)).lods
     assert [mesh.outline is not None for mesh in found] == [True, True, False]
     assert np.array_equal(found[2].vertices, capsule().vertices)
+
+
+def test_padding_of_a_texture_moves_the_coordinates_of_the_outline() -> None:
+    mesh = ribboned(capsule(texture=gradient_texture(63)), drawn=True)
+    wide = padded(mesh)
+    assert mesh.texture is not None
+    assert wide.texture is not None
+    assert mesh.outline is not None
+    assert wide.outline is not None
+    assert mesh.outline.uv is not None
+    assert wide.outline.uv is not None
+    found, expected = sample(wide.texture, wide.outline.uv), sample(mesh.texture, mesh.outline.uv)
+    assert np.abs(found.astype(int) - expected).max() <= 1
 
 
 def test_an_outline_must_fit_its_mesh() -> None:
