@@ -46,6 +46,9 @@ MAX_RAYS = 1 << 26
 
 Colour = tuple[int, int, int]
 
+MIN_LINE_PX = 0.5
+"""Least width of an outline as wide as the drawn line, pixels."""
+
 
 @dataclass
 class _Total:
@@ -82,6 +85,7 @@ def run(request: RenderRequest) -> None:
         scene = field_scene(read_figure(**request.reading()), request.settings(), first)
     else:
         scene = _mesh_scene(request.figure, first)
+    first = _with_drawn_line(first, scene, request.outline_width)
     ready = time.perf_counter()
     total = _Total()
     written = write_pictures(request.output, _turntable(scene, first, count, total), rate, request.overwrite)
@@ -112,9 +116,15 @@ def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun
         paper,
         request.ground,
         towards_sun(sun, bearing) if sun is not None and sun.up else None,
-        request.outline_width,
-        _colour("--outline-colour", request.outline_colour),
+        outline_colour=_colour("--outline-colour", request.outline_colour),
     )
+
+
+def _with_drawn_line(request: PictureRequest, scene: Scene, width_px: float | None) -> PictureRequest:
+    """Request whose outlines have the given width, or else the drawn line's at the scale of the picture, if known."""
+    if width_px is None and scene.line_width > 0:
+        width_px = max(scene.line_width / view_of(scene, request).camera.pixel, MIN_LINE_PX)
+    return request if width_px is None else replace(request, outline_px=width_px)
 
 
 def _turntable(scene: Scene, request: PictureRequest, count: int, total: _Total) -> Iterator[ByteArray]:

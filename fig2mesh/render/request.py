@@ -49,7 +49,9 @@ class RenderRequest(FigureFiles, InferenceOptions):
     ground: bool = option(
         default=False, help="Add a disc under the feet, which receives shadows; best with --pitch 15."
     )
-    outline_width: float = option(default=1.5, low=0.1, high=100, metavar="PX", help="Width of the outline.")
+    outline_width: float | None = option(
+        default=None, low=0.1, high=100, metavar="PX", help="Width of the outline. Default: the drawn line's, else 1.5."
+    )
     outline_colour: str = option(default="#221e1c", metavar="COLOUR", help="Colour of the outline.")
     lonlat: tuple[float, float] | None = option(
         default=None, metavar="LON LAT", help="For the effect sun: longitude and latitude, WGS 84 degrees."

@@ -60,6 +60,10 @@ class Scene(Protocol):
     def unit(self) -> float:
         """Length of a unit of these coordinates, in units of the input."""
 
+    @property
+    def line_width(self) -> float:
+        """Width of the drawn contour in these coordinates; 0 where it is unknown, or none is drawn."""
+
     def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         """First hits of the rays of a picture's rows, from the first to before the last."""
 
@@ -94,6 +98,10 @@ class FieldScene:
     @property
     def unit(self) -> float:
         return 1.0
+
+    @property
+    def line_width(self) -> float:
+        return 0.0 if self.sources is None or self.sources.pen is None else self.sources.pen.width
 
     def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         frame = render_frame(self.body, camera, rows, with_parts=needs.labels, with_normals=needs.normals)
@@ -154,6 +162,10 @@ class MeshScene:
     @property
     def unit(self) -> float:
         return self._caster.unit
+
+    @property
+    def line_width(self) -> float:
+        return 0.0 if self.mesh.outline is None else self.mesh.outline.width_m / self.unit
 
     def meet(self, camera: Camera, rows: tuple[int, int], needs: Needs) -> tuple[SurfaceHits, Counts]:
         rays = camera.rays(rows)
