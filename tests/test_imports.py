@@ -85,6 +85,7 @@ LAYERS = (
     ("asset_frame", "parts", "pose"),
     ("texture",),
     ("mesh",),
+    ("contour",),
     ("stages", "measure", "training"),
     ("conversion",),
     ("fig2mesh", "batch", "evaluate", "render", "view"),

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from fig2mesh.contour.contour import Contour, ContourLevel
+from fig2mesh.contour.contour_mesh import front_of
 from fig2mesh.field.body import Body
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.bake import Baked
 from fig2mesh.mesh.bake import bake as bake_mesh
-from fig2mesh.mesh.contour import Contour, ContourLevel
-from fig2mesh.mesh.contour_mesh import front_of
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.records import Figure, Mesh, UvMesh
 from fig2mesh.settings import Contours

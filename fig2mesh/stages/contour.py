@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from fig2mesh.contour.contour import Contour, contour_of
 from fig2mesh.field.body import Body
 from fig2mesh.image_frame import image_frame
-from fig2mesh.mesh.contour import Contour, contour_of
 from fig2mesh.records import Figure, Mesh
 from fig2mesh.settings import Contours
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from exporters.asset import OutlineMesh, Texture, TexturedMesh
 from fig2mesh.asset_frame import asset_from_figure
+from fig2mesh.contour.contour import Contour, ContourLevel
 from fig2mesh.mesh.bake import Baked
-from fig2mesh.mesh.contour import Contour, ContourLevel
 from fig2mesh.records import FloatArray, Mesh, Pose3D, Surface, UvMesh
 from georef.transform import Transform
 

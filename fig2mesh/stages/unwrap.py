@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from fig2mesh.contour.contour import Contour
+from fig2mesh.contour.contour_mesh import front_of
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.bake import drawn_faces
-from fig2mesh.mesh.contour import Contour
-from fig2mesh.mesh.contour_mesh import front_of
 from fig2mesh.mesh.unwrap import Drawn
 from fig2mesh.mesh.unwrap import unwrap as unwrap_mesh
 from fig2mesh.records import Figure, Mesh, UvMesh

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from exporters.solid import measure_topology
+from fig2mesh.contour.contour_mesh import front_of, hull, ribbon
+from fig2mesh.contour.inset import continued_over, inset, steady
+from fig2mesh.contour.rim import Rim, rim_of
 from fig2mesh.field.analytic import capsule, sample, sphere
 from fig2mesh.field.body import Body
-from fig2mesh.mesh.contour_mesh import front_of, hull, ribbon
-from fig2mesh.mesh.inset import continued_over, inset, steady
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.mesh.rim import Rim, rim_of
 from fig2mesh.mesh.simplify import simplify
 from fig2mesh.mesh.topology import face_vectors, half_edges
 from fig2mesh.records import FloatArray, Mesh

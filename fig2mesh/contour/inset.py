@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from fig2mesh.mesh.rim import Rim
+from fig2mesh.contour.rim import Rim
 from fig2mesh.mesh.topology import face_vectors, half_edges
 from fig2mesh.records import FloatArray, Mesh
 

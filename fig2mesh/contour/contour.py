@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fig2mesh.contour.bare import without_line
+from fig2mesh.contour.contour_mesh import ContourMesh, hull, ribbon
+from fig2mesh.contour.drawn_line import drawn_line, paper_beside
+from fig2mesh.contour.inset import continued_over, inset, steady
+from fig2mesh.contour.rim import Rim, rim_of
 from fig2mesh.field.body import Body
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.mesh.bake import visible_points
-from fig2mesh.mesh.contour_mesh import ContourMesh, hull, ribbon
-from fig2mesh.mesh.inset import continued_over, inset, steady
 from fig2mesh.mesh.normals import vertex_normals
-from fig2mesh.mesh.rim import Rim, rim_of
 from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh
 from fig2mesh.settings import Contours
-from fig2mesh.texture.bare import without_line
-from fig2mesh.texture.contour import drawn_line, paper_beside
 from fig2mesh.texture.sources import continued
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.mesh.rim import Rim
+from fig2mesh.contour.rim import Rim
 from fig2mesh.records import Mesh
 
 Floats = NDArray[np.float64]
