@@ -60,7 +60,8 @@ def test_inset_of_a_ball_is_a_smaller_ball(ball: Ball) -> None:
     moved = inset(mesh, vertex_normals(mesh), np.full(len(mesh.vertices), WIDTH))
     reach = np.linalg.norm(moved - (0.1, 0.2, -0.3), axis=1)
     assert np.quantile(np.abs(reach - (RADIUS - WIDTH)), 0.95) < 0.004
-    assert reach.min() > RADIUS - WIDTH - 0.004 and reach.max() < RADIUS + 0.002
+    assert reach.min() > RADIUS - WIDTH - 0.004
+    assert reach.max() < RADIUS + 0.002
 
 
 @pytest.mark.parametrize("width", [0.02, 0.2, 5.0])
@@ -87,7 +88,8 @@ def test_values_stay_within_the_readings(ball: Ball) -> None:
     mesh, _, rim = ball
     readings = np.where(rim.points[:, :1] > 0.1, 1.0, 0.0)
     values = continued_over(mesh, rim, readings)
-    assert values.min() >= -1e-6 and values.max() <= 1 + 1e-6
+    assert values.min() >= -1e-6
+    assert values.max() <= 1 + 1e-6
     assert continued_over(mesh, rim, np.full((len(rim.points), 1), np.nan)).max() == 0
 
 
@@ -102,13 +104,16 @@ def test_single_readings_give_way_to_those_around(ball: Ball) -> None:
 def test_ribbon_is_closed_and_lies_in_the_drawn_line(ball: Ball) -> None:
     _, _, rim = ball
     made = ribbon(rim, np.full(len(rim.points), WIDTH), np.full((len(rim.points), 3), 40.0))
-    assert made is not None and not made.culled
+    assert made is not None
+    assert not made.culled
     edges = half_edges(made.mesh.faces)
     _, index, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
     direction = np.bincount(index, np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0))
-    assert (count % 2 == 0).all() and (direction == 0).all()
+    assert (count % 2 == 0).all()
+    assert (direction == 0).all()
     reach = np.linalg.norm(made.mesh.vertices[:, :2] - (0.1, 0.2), axis=1)
-    assert reach.max() <= RADIUS + 0.005 and reach.min() >= RADIUS - 1.15 * WIDTH - 0.005
+    assert reach.max() <= RADIUS + 0.005
+    assert reach.min() >= RADIUS - 1.15 * WIDTH - 0.005
     assert (face_vectors(front_of(made.mesh))[:, 2] >= -1e-9).all()
 
 
@@ -116,12 +121,14 @@ def test_ribbon_ends_where_nothing_is_drawn(ball: Ball) -> None:
     _, _, rim = ball
     width = np.where(rim.points[:, 0] > 0.1, WIDTH, 0.0)
     made = ribbon(rim, width, np.zeros((len(rim.points), 3)))
-    assert made is not None and made.mesh.vertices[:, 0].min() > 0.0
+    assert made is not None
+    assert made.mesh.vertices[:, 0].min() > 0.0
     assert ribbon(rim, np.zeros(len(rim.points)), np.zeros((len(rim.points), 3))) is None
 
 
 def test_hull_is_the_surface_inside_out(ball: Ball) -> None:
     mesh, _, _ = ball
     made = hull(mesh, np.zeros((len(mesh.vertices), 3)))
-    assert made.culled and measure_topology(made.mesh.vertices, made.mesh.faces).closed
+    assert made.culled
+    assert measure_topology(made.mesh.vertices, made.mesh.faces).closed
     assert face_vectors(made.mesh) == pytest.approx(-face_vectors(mesh))

@@ -47,7 +47,8 @@ def test_width_and_pen(width_px: float, fill: Colour) -> None:
 @pytest.mark.parametrize("fill", [RED, SKIN, BLACK, WHITE])
 def test_flat_drawings_have_no_line(fill: Colour) -> None:
     line = read(disc(fill, None, 0))
-    assert len(line.pens) == 0 and (line.width == 0).all()
+    assert len(line.pens) == 0
+    assert (line.width == 0).all()
 
 
 def test_shading_is_no_line() -> None:
@@ -88,14 +89,16 @@ def test_a_line_along_part_of_the_rim() -> None:
     picture[: SIDE // 2] = SKIN
     line = read(picture)
     points, _ = rim()
-    assert (line.width[points[:, 1] > 0.05] == 0).all() and (line.width[points[:, 1] < -0.05] > 0).all()
+    assert (line.width[points[:, 1] > 0.05] == 0).all()
+    assert (line.width[points[:, 1] < -0.05] > 0).all()
 
 
 def test_what_is_hidden_is_not_read() -> None:
     points, outwards = rim()
     shown = points[:, 0] > 0
     line = drawn_line(disc(SKIN, BLACK, 5), FRAME, points, outwards, shown)
-    assert np.isnan(line.width[~shown]).all() and (line.width[shown] > 0).all()
+    assert np.isnan(line.width[~shown]).all()
+    assert (line.width[shown] > 0).all()
 
 
 def test_picture_without_the_line() -> None:
@@ -126,6 +129,7 @@ def test_paper() -> None:
     mask = np.zeros((60, 60), bool)
     mask[20:40, 20:40] = True
     paper = paper_beside(rgba, mask)
-    assert paper is not None and paper == pytest.approx(230)
+    assert paper is not None
+    assert paper == pytest.approx(230)
     rgba[..., 3] = 0
     assert paper_beside(rgba, mask) is None

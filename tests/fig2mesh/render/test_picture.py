@@ -352,7 +352,8 @@ def test_finished_model_shows_its_hull_as_a_line(effects: tuple[Effect, ...], ya
     mesh = mesh_of(ball(radius).body, 0.02)
     request = PictureRequest(size=(SIDE, SIDE), yaw_deg=yaw, effects=frozenset(effects))
     scene = MeshScene(hulled(mesh, width))
-    assert scene.line_width * scene.unit == pytest.approx(width) and MeshScene(mesh).line_width == 0
+    assert scene.line_width * scene.unit == pytest.approx(width)
+    assert MeshScene(mesh).line_width == 0
     shown = render(scene, request).rgba
     drawn, inked = shown[..., 3] > 0, (shown == (*PEN, 255)).all(axis=2)
     # In perspective both outlines are those of tangent cones; their radii still have the ratio of the balls', nearly.
