@@ -73,9 +73,15 @@ def test_cesiumjs_shows_outlines_without_hiding_the_figure(
     if browser is None:
         pytest.skip(f"no browser ({', '.join(BROWSERS)}): CesiumJS not tried; apt-get install chromium")
     monkeypatch.setenv("NODE_PATH", str(codecs))
-    shapes = {"bare": capsule(), "hull": hulled(capsule()), "ribbon": ribboned(capsule(), pens=2)}
+    shapes = {
+        "bare": capsule(),
+        "hull": hulled(capsule()),
+        "ribbon": ribboned(capsule(), pens=2),
+        "ribbon as drawn": ribboned(capsule(), drawn=True),
+    }
+    names = (None, "cesiumjs", "cesiumjs-ktx2")
     models = []
-    for name in (None, "cesiumjs"):
+    for name in names:
         for form, mesh in shapes.items():
             path = tmp_path / f"{name} {form}.glb"
             write(asset(ZURICH, lods=(mesh,)), path, profile=profile_named(name))
@@ -85,7 +91,7 @@ def test_cesiumjs_shows_outlines_without_hiding_the_figure(
     job = {"browser": browser, "cesium": cesium, "models": models, "width": 120, "height": 200}
     found = run("cesium_models.mjs", stdin=job)
     assert [(each.get("error"), each["messages"]) for each in found] == [(None, [])] * len(models)
-    assert [each["outline"] for each in found] == [False, True, True] * 2
+    assert [each["outline"] for each in found] == [False, True, True, True] * len(names)
     bare = _pixels(found[0]["png"])
     for each, model in zip(found[1:], models[1:], strict=True):
         # Far from the line the figure is as without: nothing is in front of it.
