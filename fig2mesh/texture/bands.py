@@ -20,6 +20,9 @@ MAX_CHORD: Final = 0.9
 MAX_SLANT: Final = 0.55
 """Largest cosine between a band and the bone."""
 
+STEEP: Final = 0.05
+"""Width from which bands may be as slanted, FIGURE units; narrow stripes may be less so."""
+
 MIN_FACING: Final = 0.35
 """Least cosine between the rim's inward normal and the band."""
 
@@ -101,7 +104,8 @@ def match_runs(
             places = tuple(np.clip(np.round(line).astype(int), 0, np.array(region.shape) - 1).T)
             bone = axis[places]
             slant = float(np.abs(bone @ along).mean())
-            if region[places].mean() < INSIDE or slant > MAX_SLANT:
+            limit = MAX_SLANT * min(1.0, max(wide) * pitch / STEEP + 0.3)
+            if region[places].mean() < INSIDE or slant > limit:
                 continue
             candidates.append((slant * length + UNEQUAL * abs(wide[0] - wide[1]), i, j))
     pairs: list[tuple[int, int]] = []

@@ -22,7 +22,7 @@ BESIDE: Final = (0.5, 2.2, -0.8, 0.4)
 CROWN: Final = (1.2, 0.5)
 """Half width and least height above the eyes of the crown of a head, face radii."""
 
-MIN_HAIR: Final = 0.05
+MIN_HAIR: Final = 0.03
 """Least area of hair beside a face, squares of the face radius."""
 
 BRIM: Final = 1.6
@@ -36,7 +36,7 @@ NAPE_QUANTILE: Final = 0.03
 TOP: Final = 0.9
 """Height above the eyes from which a head is never bare where it has hair, face radii."""
 
-SKIN_HUE, SKIN_LIGHT = 16.0, 28.0
+SKIN_HUE, SKIN_LIGHT = 10.0, 28.0
 """Tolerances for shades of skin, CIELAB units: of a and b, and of L."""
 
 PROFILE: Final = 0.55

@@ -16,11 +16,14 @@ from fig2mesh.skeleton import PART
 from fig2mesh.texture.axes import bone_axes
 from fig2mesh.texture.heads import Face, head_materials
 from fig2mesh.texture.materials import Materials
-from fig2mesh.texture.patterns import patterned
+from fig2mesh.texture.patterns import patterned, striped
 from fig2mesh.texture.pen import Pen, lined_pairs, reinked
 from fig2mesh.texture.tints import continued_tints, drawn_tints
 from fig2mesh.texture.window import PITCH, Window, window_around
 from fig2mesh.texture.wrap import PATTERN_WINDOW, Sheet, back_materials, front_materials, rim_colours, settled
+
+HATCHED: Final = 0.3
+"""Least share of ink in a drawing by lines, whose hatching is its pattern."""
 
 ON_BONE: Final = 0.35
 """Distance from a limb's bone, its radii, within which lies what belongs to the limb."""
@@ -88,7 +91,13 @@ def layer_pictures(
             plain = plain + np.stack([window.to_picture(tint[..., c], reach) for c in range(3)], axis=-1)
         pictures.append(plain)
     region, head = (window.to_picture(mask.astype(np.float64), reach) > 0.5 for mask in (sheet.region, sheet.head))
-    drawn = patterned(drawing.materials.index[reach], kinds[0], shown, region, PATTERN_WINDOW / drawing.pitch)
+    marked = drawing.materials.index[reach]
+    if drawing.materials.ink[reach][shown].mean() < HATCHED:
+        # Lines of seams, folds and plackets are no pattern; hatching is.
+        marked = np.where(drawing.materials.ink[reach], kinds[0], marked)
+    drawn = patterned(marked, kinds[0], shown, region, PATTERN_WINDOW / drawing.pitch)
+    stripes = striped(front, sheet.shown & sheet.region & ~sheet.head, PATTERN_WINDOW / PITCH)
+    drawn |= shown & (window.to_picture(stripes.astype(np.float64), reach) > 0.5)
     drawn &= ~head & (kinds[0] == kinds[1])
     original = drawing.picture[reach]
     pictures = [np.where(drawn[..., None], original, picture) for picture in pictures]

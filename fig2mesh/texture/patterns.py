@@ -26,14 +26,17 @@ MIN_MARKS: Final = 8
 RIM: Final = 0.6
 """Marks nearer than this to the border of what is shown are its contour, windows."""
 
+MIN_MARKED: Final = 0.18
+"""Least share of an area that its marks take up: lines of a placket or of folds take less."""
+
 MIN_STRIPES: Final = 3
-"""Least number of stripes of each of two colours."""
+"""Least number of stripes of one colour."""
 
-MAX_STRIPE: Final = 1.4
-"""Largest half width of a stripe, windows."""
+MIN_TURN: Final = 0.22
+"""Least share of each of two colours nearby where they are in turn."""
 
-MIN_STRIPED: Final = 5.0
-"""Edge of the square that striped areas cover at least, windows."""
+MIN_STRIPED: Final = 2.0
+"""Least half width of an area of stripes, windows: at a plain border two colours are near too."""
 
 MIN_PX: Final = 3
 """Least size of a mark, pixels; smaller ones are noise."""
@@ -72,6 +75,8 @@ def patterned(
         there = np.bincount(areas[room], minlength=total)
         covered = np.bincount(areas[room & near], minlength=total)
         chosen &= covered >= MIN_COVERED * np.maximum(there, 1)
+    marked = np.bincount(areas[inner & (marks > 0)], minlength=total)
+    chosen &= marked >= MIN_MARKED * np.bincount(areas[inner], minlength=total)
     # An area that does not reach the rim does not go on behind.
     chosen &= np.bincount(areas[outer], minlength=total) >= MIN_RIM * window * (AT_RIM - RIM) * window
     pairs = np.unique(np.stack([areas[marks > 0], marks[marks > 0]]), axis=1)
@@ -85,41 +90,35 @@ def striped(front: NDArray[np.int_], own: NDArray[np.bool_], window: float) -> N
 
     front : (h, w) colour of each area; own : (h, w) bool, visible pixels; window : pixels, see `patterned`
     """
-    stripes: dict[int, NDArray[np.int_]] = {}
-    for colour in np.unique(front[own]).tolist():
-        areas, count = ndimage.label(own & (front == colour))
-        numbers = np.arange(count + 1)
-        wide = np.asarray(ndimage.maximum(ndimage.distance_transform_edt(areas > 0), areas, numbers))
-        size = np.bincount(areas.ravel(), minlength=count + 1)
-        narrow = (wide <= MAX_STRIPE * window) & (size >= window**2)
-        narrow[0] = False
-        if narrow.sum() >= MIN_STRIPES:
-            stripes[colour] = np.where(narrow[areas], areas, 0)
     result = np.zeros_like(own)
-    for first in stripes:
-        for second in stripes:
-            if first != second:
-                result |= _in_turn(stripes[first], stripes[second], window)
-    pieces, count = ndimage.label(ndimage.binary_closing(result, np.ones((3, 3))) & own)
-    large = np.bincount(pieces.ravel(), minlength=count + 1) >= (MIN_STRIPED * window) ** 2
-    large[0] = False
-    return np.asarray(large[pieces])
+    inside = np.maximum(ndimage.gaussian_filter(own.astype(np.float32), 1.5 * window), 1e-3)
+    share = {
+        colour: ndimage.gaussian_filter((own & (front == colour)).astype(np.float32), 1.5 * window) / inside
+        for colour in np.unique(front[own]).tolist()
+    }
+    for first in share:
+        for second in share:
+            if first >= second:
+                continue
+            zone = own & (share[first] > MIN_TURN) & (share[second] > MIN_TURN)
+            zone &= (front == first) | (front == second)
+            pieces, count = ndimage.label(zone)
+            if not count:
+                continue
+            numbers = np.arange(count + 1)
+            wide = np.asarray(ndimage.maximum(ndimage.distance_transform_edt(zone), pieces, numbers))
+            several = [_parts(zone & (front == colour), pieces, count) for colour in (first, second)]
+            good = (wide >= MIN_STRIPED * window) & (np.maximum(*several) >= MIN_STRIPES)
+            good[0] = False
+            result |= good[pieces]
+    return result
 
 
-def _in_turn(first: NDArray[np.int_], second: NDArray[np.int_], window: float) -> NDArray[np.bool_]:
-    """Areas of the first colour that are beside two of the second, and those, if there are enough of both."""
-    _, source = ndimage.distance_transform_edt(second == 0, return_indices=True)
-    near = ndimage.distance_transform_edt(second == 0) <= 0.5 * window
-    at = (first > 0) & near
-    pairs = np.unique(np.stack([first[at], second[tuple(source)][at]]), axis=1)
-    neighbours = np.bincount(pairs[0], minlength=int(first.max()) + 1) if pairs.size else np.zeros(1)
-    between = np.flatnonzero(neighbours >= 2)
-    if len(between) < MIN_STRIPES - 1:
-        return np.zeros(first.shape, bool)
-    beside = np.unique(pairs[1][np.isin(pairs[0], between)])
-    if len(beside) < MIN_STRIPES:
-        return np.zeros(first.shape, bool)
-    return np.asarray(np.isin(first, between) | np.isin(second, beside))
+def _parts(stripes: NDArray[np.bool_], pieces: NDArray[np.int_], count: int) -> NDArray[np.int_]:
+    """(count + 1,) number of separate stripes in each piece."""
+    parts, _ = ndimage.label(stripes)
+    pairs = np.unique(np.stack([pieces[stripes], parts[stripes]]), axis=1)
+    return np.bincount(pairs[0], minlength=count + 1)
 
 
 def _areas(kind: NDArray[np.int_], own: NDArray[np.bool_]) -> NDArray[np.int_]:

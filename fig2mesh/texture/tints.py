@@ -14,6 +14,9 @@ BLUR: Final = 0.015
 """Standard deviation of the average over a drawing's own pixels, FIGURE units."""
 
 
+MAX_TINT: Final = 30.0
+"""Largest difference from a material's colour, RGB 0-255."""
+
 MIN_WEIGHT: Final = 0.1
 """Least share of a material's own pixels in the average."""
 
@@ -44,7 +47,7 @@ def drawn_tints(
         for channel in range(3):
             difference = own * (picture[..., channel] - colour[k, channel])
             mean = ndimage.gaussian_filter(difference, BLUR / pitch) / np.maximum(weight, 1e-9)
-            result[there, channel] = mean[there]
+            result[there, channel] = np.clip(mean[there], -MAX_TINT, MAX_TINT)
         known |= there
     return result, known
 

@@ -17,15 +17,21 @@ from scipy import ndimage
 
 from fig2mesh.texture.bands import Run, draw_bands, drawn_bands, find_runs, match_runs
 from fig2mesh.texture.diffusion import diffused
-from fig2mesh.texture.heads import FACE, FacePositions, HeadMaterials, covered_rim
+from fig2mesh.texture.heads import BESIDE, FACE, FacePositions, HeadMaterials, covered_rim
 from fig2mesh.texture.patterns import striped
 from fig2mesh.texture.rim import NEAR, REACH, SMOOTH, STEP, Rim, count_votes, decided, find_rim, samples
 
 ANISOTROPY: Final = 5.0
 """Ratio of distances along and across a bone at which colours have the same weight."""
 
-MIN_RUN: Final = 0.022
+MIN_RUN: Final = 0.03
 """Least length of a run of the rim that is not an end of a band, FIGURE units."""
+
+AT_SIDE: Final = 0.04
+"""Distance from the rim to which colours of one side go in any case, FIGURE units."""
+
+EARRING: Final = 0.7
+"""Largest length of a run of the rim beside a face that is no hair, face radii."""
 
 MIN_AREA: Final = 0.025**2
 """Least area of one material, FIGURE units²."""
@@ -139,6 +145,7 @@ def without_short_runs(colours: RimColours, paired: set[int], runs: list[Run], p
     """(N,) materials with short runs unknown that are not ends of bands."""
     result = colours.material.copy()
     for number, run in enumerate(runs):
+        result[run.members] = run.material
         if number not in paired and len(run.members) * pitch < MIN_RUN:
             result[run.members] = -1
     return result
@@ -150,6 +157,8 @@ def back_materials(sheet: Sheet, colours: RimColours, front: NDArray[np.int_]) -
     front : (H, W) material of the near side
     """
     runs = find_runs(colours.rim, colours.material)
+    if sheet.face is not None and sheet.skin is not None:
+        runs = [_without_earrings(sheet, colours.rim, run) for run in runs]
     pairs = match_runs(colours.rim, runs, sheet.region, sheet.axis, sheet.pitch)
     material = without_short_runs(colours, {i for pair in pairs for i in pair}, runs, sheet.pitch)
     fixed = _at_rim(sheet.region, colours.rim, material)
@@ -169,7 +178,32 @@ def back_materials(sheet: Sheet, colours: RimColours, front: NDArray[np.int_]) -
         kept = np.where(beyond, -1, np.where(fixed >= 0, fixed, first))
         share = diffused(sheet.region, sheet.region & (kept >= 0), one_hot(kept, sheet.number), sheet.axis, ANISOTROPY)
         share[beyond, first[beyond]] = 0.0
-    return share
+    return _covered(sheet, share)
+
+
+def _covered(sheet: Sheet, share: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shares without skin on the back of a head that has hair."""
+    if sheet.face is None or sheet.skin is None:
+        return share
+    behind = sheet.region & sheet.head & (sheet.face.above > sheet.skin.nape)
+    result = share.copy()
+    for k in sheet.skin.skin:
+        result[behind, k] = 0.0
+    empty = behind & (result.sum(axis=-1) < 1e-3)
+    result[empty, sheet.skin.hair] = 1.0
+    return result
+
+
+def _without_earrings(sheet: Sheet, rim: Rim, run: Run) -> Run:
+    """Give a short run beside a face, an earring or an ear, the colour of the hair."""
+    assert sheet.face is not None and sheet.skin is not None
+    if run.material < 0 or len(run.members) * sheet.pitch > EARRING * sheet.face.radius:
+        return run
+    place = tuple(np.clip(np.round(rim.points[run.members]).astype(int), 0, np.array(sheet.region.shape) - 1).T)
+    above = sheet.face.above[place]
+    if sheet.head[place].mean() < 0.5 or above.max() > BESIDE[3] or above.min() < sheet.skin.nape:
+        return run
+    return Run(run.members, sheet.skin.hair)
 
 
 def _middle_of_face(sheet: Sheet) -> NDArray[np.bool_]:
@@ -199,6 +233,7 @@ def _beyond_extent(
     bone = sheet.axis[place]
     side = bone[:, 0] * rim.inwards[:, 1] - bone[:, 1] * rim.inwards[:, 0]
     result = np.zeros_like(sheet.region)
+    depth = ndimage.distance_transform_edt(np.pad(sheet.region, 1))[1:-1, 1:-1]
     for k in np.unique(back[sheet.region]):
         pieces, count = ndimage.label(sheet.region & (back == k))
         at = pieces[place]
@@ -206,9 +241,7 @@ def _beyond_extent(
         right = np.bincount(at[side < -0.3], minlength=count + 1)
         lone = (np.minimum(left, right) < 0.1 * (left + right)) & (left + right > 0)
         lone[0] = False
-        # Where the front shows none of it there is no extent to keep to.
-        lone &= np.bincount(pieces[front == k], minlength=count + 1) > 0
-        result |= lone[pieces] & (front != k) & (fixed < 0)
+        result |= lone[pieces] & (front != k) & (depth > AT_SIDE / sheet.pitch) & (fixed < 0)
     return result
 
 
