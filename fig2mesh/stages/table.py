@@ -33,11 +33,6 @@ def _simplify(settings: Settings) -> str:
     return f"{settings.triangles} triangles{levels}"
 
 
-def _textures(settings: Settings) -> str:
-    inferred = settings.textures == "network"
-    return "colours of hidden sides, " + ("by two networks" if inferred else "those in front of them")
-
-
 NO_POINTS: Final = Unless("mesher", "isosurface", "the isosurface needs no points")
 NO_TEXTURE: Final = Unless("textures", "none", "no texture is requested")
 
@@ -50,7 +45,7 @@ STAGES: Final[tuple[Stage, ...]] = (
     Stage(simplify, _simplify),
     Stage(surface, lambda settings: "normals, parts and deviation of the simplified mesh"),
     Stage(unwrap, lambda settings: "texture coordinates", unless=NO_TEXTURE),
-    Stage(textures, _textures, Kept.NEVER, NO_TEXTURE),
+    Stage(textures, lambda settings: "colours of hidden sides, continued from the rim", Kept.NEVER, NO_TEXTURE),
     Stage(bake, lambda settings: f"a texture of {settings.texture_size} texels per side", unless=NO_TEXTURE),
     Stage(model, lambda settings: "metres, on the ground", Kept.NEVER),
 )

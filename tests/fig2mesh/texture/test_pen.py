@@ -52,7 +52,7 @@ def test_drawings_without_contours_have_no_pen() -> None:
 def test_areas_meet_in_a_line_where_they_do_in_the_drawing() -> None:
     kind, own = flag()
     pen = find_pen(PALETTE, kind, WEIGHT, own)
-    picture = reinked(PALETTE, plain(), own, pen)
+    picture = reinked(PALETTE, plain(), lined_pairs(PALETTE, plain(), own, pen), pen)
     column = np.linalg.norm(picture[:, 30] - PALETTE[INK], axis=1)
     dark = np.flatnonzero(column < 60)
     assert 38 <= dark.min() <= dark.max() <= 42
