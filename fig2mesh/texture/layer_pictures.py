@@ -31,11 +31,11 @@ from fig2mesh.texture.wrap import (
     settled,
 )
 
-MIN_SURE: Final = 0.65
+MIN_SURE: Final = 0.6
 """Least median share of the votes for the materials of a rim."""
 
-HATCHED: Final = 0.3
-"""Least share of ink in a drawing by lines, whose hatching is its pattern."""
+HATCHED: Final = 0.6
+"""Least share of ink in a print by lines, whose hatching is its pattern."""
 
 ON_BONE: Final = 0.35
 """Distance from a limb's bone, its radii, within which lies what belongs to the limb."""
@@ -87,9 +87,10 @@ def layer_pictures(
     front_share = front_materials(sheet)
     front = front_share.argmax(axis=-1)
     rim = rim_colours(sheet, front)
+    mirrored = drawing.profile or _unsure(sheet, rim)
     if drawing.profile:
         back_share = front_share
-    elif _unsure(sheet, rim):
+    elif mirrored:
         back_share = covered(sheet, front_share)
     else:
         back_share = back_materials(sheet, rim, front)
@@ -109,8 +110,8 @@ def layer_pictures(
         pictures.append(plain)
     region, head = (window.to_picture(mask.astype(np.float64), reach) > 0.5 for mask in (sheet.region, sheet.head))
     marked = drawing.materials.index[reach]
-    if drawing.materials.ink[reach][shown].mean() < HATCHED:
-        # Lines of seams, folds and plackets are no pattern; hatching is.
+    if not mirrored:
+        # Lines of seams, folds and plackets are no pattern; hatching and the lines of a profile are.
         marked = np.where(drawing.materials.ink[reach], kinds[0], marked)
     drawn = patterned(marked, kinds[0], shown, region, PATTERN_WINDOW / drawing.pitch)
     stripes = striped(front, sheet.shown & sheet.region & ~sheet.head, PATTERN_WINDOW / PITCH)
@@ -217,6 +218,8 @@ def foreign_pixels(drawing: Drawing, canvas: Canvas, divided: Split) -> NDArray[
     """(h, w) bool: pixels that the split attributes to a layer although they are slivers of another's areas."""
     from fig2mesh.texture.owners import slivers
 
+    if drawing.own.any() and drawing.materials.ink[drawing.own].mean() > HATCHED:
+        return np.zeros_like(drawing.own)
     number, bones = np.full(canvas.sdf.shape, -1), np.zeros(canvas.sdf.shape, bool)
     points = canvas.points()
     for index, layer in enumerate(divided.layers):
