@@ -10,7 +10,7 @@ Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
 Precision = Literal["float32", "bfloat16"]
-Textures = Literal["network", "plain", "none"]
+Textures = Literal["wrap", "none"]
 Contours = Literal["hull", "keep", "drop"]
 
 
@@ -29,8 +29,7 @@ class Settings:
     mesher : method that turns the surface into a mesh
     closing : method that closes the holes left by ball pivoting
     parts : source of depths: networks, or rules and the outline alone
-    textures : of sides that the drawing does not show: inferred by networks, or plain colours of what is drawn in
-        front of them; none at all
+    textures : of sides that the drawing does not show: colours of the rim go round; none: no texture at all
     contours : form of the line along the silhouette, if drawn: an inverted hull, a ribbon ("keep"), or none
     light : clients light the surface; without, they show its colours as they are
     normals : whether any output or effect needs shading normals, see `fig2mesh.conversion.plan`
@@ -49,7 +48,7 @@ class Settings:
     mesher: Mesher = "ball-pivot"
     closing: Closing = "pymeshlab"
     parts: Parts = "network"
-    textures: Textures = "network"
+    textures: Textures = "wrap"
     contours: Contours = "keep"
     light: bool = False
     normals: bool = True
@@ -75,11 +74,8 @@ PRESETS: dict[Quality, Settings] = {
 def settings_for(quality: Quality, **changes: object) -> Settings:
     """A preset with the given fields replaced; fields that are None keep the preset's value.
 
-    Unless given, `textures` uses no networks where `parts` does not, and a figure without colours is lit, as it would
-    be a white silhouette otherwise.
+    Unless given, a figure without colours is lit, as it would be a white silhouette otherwise.
     """
     given = {name: value for name, value in changes.items() if value is not None}
-    if given.get("parts") == "outline":
-        given.setdefault("textures", "plain")
     given.setdefault("light", given.get("textures") == "none")
     return replace(PRESETS[quality], **given)  # type: ignore[arg-type]

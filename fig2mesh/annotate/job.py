@@ -60,7 +60,7 @@ def preview_page(subject: AnnotatedPicture, annotation: Annotation, parts: Parts
     """HTML page of the model in draft quality. Raises FigureError if the silhouette is empty."""
     if not annotation.mask.any():
         raise FigureError(subject.picture, "the silhouette is empty", "paint it first")
-    settings = settings_for("draft", parts=parts, textures="plain", device="cpu", seed=0)
+    settings = settings_for("draft", parts=parts, device="cpu", seed=0)
     return view_page(scene_of(annotation.figure(subject.name, subject.rgba), settings, FIGURE_HEIGHT))
 
 

@@ -127,8 +127,8 @@ class InferenceOptions:
     )
     textures: Textures | None = option(
         default=None,
-        help="Colours of sides that the drawing does not show: painted by neural networks (default), or plain colours "
-        "taken from the drawing (default with --parts outline). none: no texture at all.",
+        help="Colours of sides that the drawing does not show: those of its rim go round (default). none: no texture "
+        "at all.",
     )
     contours: Contours = option(
         default="keep",

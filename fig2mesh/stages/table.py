@@ -34,11 +34,6 @@ def _simplify(settings: Settings) -> str:
     return f"{settings.triangles} triangles{levels}"
 
 
-def _textures(settings: Settings) -> str:
-    inferred = settings.textures == "network"
-    return "colours of hidden sides, " + ("by two networks" if inferred else "those in front of them")
-
-
 def _contour(settings: Settings) -> str:
     forms = {"hull": "an inverted hull", "keep": "a ribbon along the silhouette", "drop": "left off"}
     return f"the drawn contour, {forms[settings.contours]}"
@@ -57,7 +52,7 @@ STAGES: Final[tuple[Stage, ...]] = (
     Stage(surface, lambda settings: "normals, parts and deviation of the simplified mesh"),
     Stage(contour, _contour, unless=NO_TEXTURE),
     Stage(unwrap, lambda settings: "texture coordinates", unless=NO_TEXTURE),
-    Stage(textures, _textures, Kept.NEVER, NO_TEXTURE),
+    Stage(textures, lambda settings: "colours of hidden sides, continued from the rim", Kept.NEVER, NO_TEXTURE),
     Stage(bake, lambda settings: f"a texture of {settings.texture_size} texels per side", unless=NO_TEXTURE),
     Stage(model, lambda settings: "metres, on the ground", Kept.NEVER),
 )

@@ -2,27 +2,13 @@
 
 from __future__ import annotations
 
-from fig2mesh.field.body import Body
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.outline import Outline
-from fig2mesh.records import Figure, FloatArray, Pose3D
-from fig2mesh.settings import Contours, Textures
-from fig2mesh.texture.majority import UnobservedPoints
+from fig2mesh.records import Figure
+from fig2mesh.settings import Contours
 from fig2mesh.texture.sources import Sources, make_sources
 
 
-def textures(
-    figure: Figure,
-    lift: Pose3D,
-    parts: Outline,
-    body: Body,
-    *,
-    textures: Textures,
-    contours: Contours,
-    texture_size: int,
-    seed: int,
-) -> Sources:
+def textures(figure: Figure, parts: Outline, *, contours: Contours, texture_size: int, seed: int) -> Sources:
     """Pictures from which the bake takes the colours of all texels."""
-    frame = image_frame(figure)
-
-    return make_sources(figure, frame, parts, texture_size, seed, contours=contours != "drop")
+    return make_sources(figure, image_frame(figure), parts, texture_size, seed, contours=contours != "drop")

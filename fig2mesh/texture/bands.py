@@ -120,9 +120,7 @@ def match_runs(
     return pairs
 
 
-def draw_bands(
-    rim: Rim, runs: list[Run], pairs: list[tuple[int, int]], region: NDArray[np.bool_]
-) -> NDArray[np.int_]:
+def draw_bands(rim: Rim, runs: list[Run], pairs: list[tuple[int, int]], region: NDArray[np.bool_]) -> NDArray[np.int_]:
     """(H, W) material of the bands between paired runs, -1 elsewhere."""
     from skimage.draw import polygon
 
@@ -155,7 +153,7 @@ def drawn_bands(
     result = np.full(region.shape, -1)
     depth = ndimage.distance_transform_edt(np.pad(region, 1))[1:-1, 1:-1] * pitch
     for k in np.unique(front[region]):
-        areas, count = ndimage.label(region & (front == k))
+        areas, _ = ndimage.label(region & (front == k))
         for number, box in enumerate(ndimage.find_objects(areas), start=1):
             rows, columns = np.nonzero(areas[box] == number)
             rows, columns = rows + box[0].start, columns + box[1].start
@@ -193,9 +191,7 @@ def _unit(vector: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9))
 
 
-def _cross(
-    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
-) -> bool:
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]) -> bool:
     """Whether the segments a-b and c-d cross."""
 
     def side(p: NDArray[np.float64], q: NDArray[np.float64], r: NDArray[np.float64]) -> float:

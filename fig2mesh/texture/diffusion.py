@@ -1,4 +1,4 @@
-"""Anisotropic diffusion of fixed values over a region of a raster: each free pixel is a weighted mean of its neighbours.
+"""Anisotropic diffusion of fixed values over a region: each free pixel is a weighted mean of its neighbours.
 
 Weights are never negative, so that values lie between those that are fixed (maximum principle). Where the edge of the
 region is not fixed nothing flows across it.
@@ -90,9 +90,7 @@ def _edges(
 
     def product(i: int, j: int) -> NDArray[np.float64]:
         u, v = base[i], base[j]
-        return np.asarray(
-            a * u[:, 0] * v[:, 0] + b * (u[:, 0] * v[:, 1] + u[:, 1] * v[:, 0]) + c * u[:, 1] * v[:, 1]
-        )
+        return np.asarray(a * u[:, 0] * v[:, 0] + b * (u[:, 0] * v[:, 1] + u[:, 1] * v[:, 0]) + c * u[:, 1] * v[:, 1])
 
     for _ in range(MAX_STEPS):
         changed = False

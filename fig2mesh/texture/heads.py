@@ -147,7 +147,11 @@ def head_materials(
         hat = int(counts.argmax())
         brim = other & (index == hat) & (above > 0)
         if aside[brim].max(initial=0) > BRIM and np.ptp(face.aside[brim]) > 2 * BRIM:
-            return None
+            # The brim hides no neck; below it there is the hair that shows at all, be it a moustache.
+            below = other & (index != hat) & (aside < BESIDE[1]) & (above > FACE[1]) & (above < BESIDE[3])
+            counts = np.bincount(index[below], minlength=len(colour))
+            if counts.max(initial=0) < least:
+                return None
     hair = int(counts.argmax())
     low = np.quantile(above[other & (index == hair)], NAPE_QUANTILE) if (other & (index == hair)).any() else NAPE
     return HeadMaterials(skin, hair, min(float(low), NAPE))

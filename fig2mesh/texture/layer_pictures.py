@@ -20,10 +20,22 @@ from fig2mesh.texture.patterns import patterned, striped
 from fig2mesh.texture.pen import Pen, lined_pairs, reinked
 from fig2mesh.texture.tints import continued_tints, drawn_tints
 from fig2mesh.texture.window import PITCH, Window, window_around
-from fig2mesh.texture.wrap import PATTERN_WINDOW, Sheet, back_materials, front_materials, rim_colours, settled
+from fig2mesh.texture.wrap import (
+    PATTERN_WINDOW,
+    RimColours,
+    Sheet,
+    back_materials,
+    covered,
+    front_materials,
+    rim_colours,
+    settled,
+)
 
-HATCHED: Final = 0.3
-"""Least share of ink in a drawing by lines, whose hatching is its pattern."""
+MIN_SURE: Final = 0.6
+"""Least median share of the votes for the materials of a rim."""
+
+HATCHED: Final = 0.6
+"""Least share of ink in a print by lines, whose hatching is its pattern."""
 
 ON_BONE: Final = 0.35
 """Distance from a limb's bone, its radii, within which lies what belongs to the limb."""
@@ -75,7 +87,13 @@ def layer_pictures(
     front_share = front_materials(sheet)
     front = front_share.argmax(axis=-1)
     rim = rim_colours(sheet, front)
-    back_share = front_share if drawing.profile else back_materials(sheet, rim, front)
+    mirrored = drawing.profile or _unsure(sheet, rim)
+    if drawing.profile:
+        back_share = front_share
+    elif mirrored:
+        back_share = covered(sheet, front_share)
+    else:
+        back_share = back_materials(sheet, rim, front)
     near, far = (settled(share, sheet.region, PITCH) for share in (front_share, back_share))
     index = near.argmax(axis=-1), far.argmax(axis=-1)
     tints = _tints(drawing, window, sheet, *index)
@@ -92,8 +110,8 @@ def layer_pictures(
         pictures.append(plain)
     region, head = (window.to_picture(mask.astype(np.float64), reach) > 0.5 for mask in (sheet.region, sheet.head))
     marked = drawing.materials.index[reach]
-    if drawing.materials.ink[reach][shown].mean() < HATCHED:
-        # Lines of seams, folds and plackets are no pattern; hatching is.
+    if not mirrored:
+        # Lines of seams, folds and plackets are no pattern; hatching and the lines of a profile are.
         marked = np.where(drawing.materials.ink[reach], kinds[0], marked)
     drawn = patterned(marked, kinds[0], shown, region, PATTERN_WINDOW / drawing.pitch)
     stripes = striped(front, sheet.shown & sheet.region & ~sheet.head, PATTERN_WINDOW / PITCH)
@@ -103,6 +121,12 @@ def layer_pictures(
     pictures = [np.where(drawn[..., None], original, picture) for picture in pictures]
     near_picture, far_picture = (_whole(picture, reach, drawing.own.shape) for picture in pictures)
     return LayerPictures(near_picture, far_picture)
+
+
+def _unsure(sheet: Sheet, rim: RimColours) -> bool:
+    """Whether a rim shows strokes rather than colours, as prints do: its colours would be accidents."""
+    own = sheet.region & sheet.shown
+    return bool((own.any() and sheet.ink[own].mean() > HATCHED) or np.median(rim.share) < MIN_SURE)
 
 
 def _sheet(
@@ -181,9 +205,7 @@ def _cut(pen: Pen | None, reach: tuple[slice, slice]) -> Pen | None:
     return None if pen is None else Pen(pen.colour, pen.width, pen.near[reach])
 
 
-def _whole(
-    picture: NDArray[np.float32], reach: tuple[slice, slice], shape: tuple[int, int]
-) -> NDArray[np.float32]:
+def _whole(picture: NDArray[np.float32], reach: tuple[slice, slice], shape: tuple[int, int]) -> NDArray[np.float32]:
     """Continue a part of a picture to the whole of it by its border."""
     row, column = (
         np.clip(np.arange(size), span.start, min(span.stop, size) - 1) - span.start
@@ -196,6 +218,8 @@ def foreign_pixels(drawing: Drawing, canvas: Canvas, divided: Split) -> NDArray[
     """(h, w) bool: pixels that the split attributes to a layer although they are slivers of another's areas."""
     from fig2mesh.texture.owners import slivers
 
+    if drawing.own.any() and drawing.materials.ink[drawing.own].mean() > HATCHED:
+        return np.zeros_like(drawing.own)
     number, bones = np.full(canvas.sdf.shape, -1), np.zeros(canvas.sdf.shape, bool)
     points = canvas.points()
     for index, layer in enumerate(divided.layers):
@@ -206,9 +230,7 @@ def foreign_pixels(drawing: Drawing, canvas: Canvas, divided: Split) -> NDArray[
             bones[layer.shown] |= away.min(axis=1) < 0
     height, width = drawing.own.shape
     rows, columns = np.mgrid[0:height, 0:width]
-    at = canvas.pixels(
-        drawing.frame.figure_from_image(np.stack([columns + 0.5, rows + 0.5], axis=-1) * drawing.factor)
-    )
+    at = canvas.pixels(drawing.frame.figure_from_image(np.stack([columns + 0.5, rows + 0.5], axis=-1) * drawing.factor))
     row, column = np.clip(np.round(at).astype(int), 0, np.array(number.shape) - 1).transpose(2, 0, 1)
     layers = np.where(drawing.own, number[row, column], -1)
     return slivers(layers, drawing.materials.index, drawing.materials.ink, bones[row, column], drawing.pitch)

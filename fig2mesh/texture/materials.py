@@ -1,4 +1,4 @@
-"""Materials of a drawing: palette colours that are light and shade of one thing, and the strokes that belong to none."""
+"""Materials of a drawing: palette colours that are light and shade of one thing, and strokes that are of none."""
 
 from __future__ import annotations
 
@@ -217,4 +217,3 @@ def _borders(
         np.add.at(border, (low, high), 1.0)
         np.add.at(inked, (low, high), (ink_a | ink_b)[there].astype(float))
     return border, inked
-

@@ -26,8 +26,8 @@ MIN_MARKS: Final = 8
 RIM: Final = 0.6
 """Marks nearer than this to the border of what is shown are its contour, windows."""
 
-MIN_MARKED: Final = 0.18
-"""Least share of an area that its marks take up: lines of a placket or of folds take less."""
+MIN_MARKED: Final = 0.06
+"""Least share of an area that its marks take up."""
 
 MIN_STRIPES: Final = 3
 """Least number of stripes of one colour."""

@@ -63,7 +63,8 @@ def find_rim(region: NDArray[np.bool_]) -> Rim:
         ndimage.distance_transform_edt(padded) - ndimage.distance_transform_edt(~padded), 1.5
     )
     slope = np.stack(np.gradient(distance), axis=-1)
-    points, contour = [], []
+    points: list[NDArray[np.float64]] = []
+    contour: list[NDArray[np.int_]] = []
     for found in find_contours(soft, 0.5):
         if len(found) >= MIN_POINTS:
             points.append(found[:-1])
@@ -86,9 +87,7 @@ def samples(rim: Rim, depth: float) -> NDArray[np.float64]:
     return np.asarray(rim.points[:, None] + steps[:, None] * rim.inwards[:, None])
 
 
-def count_votes(
-    found: NDArray[np.int_], valid: NDArray[np.bool_], number: int, reach: int
-) -> NDArray[np.float64]:
+def count_votes(found: NDArray[np.int_], valid: NDArray[np.bool_], number: int, reach: int) -> NDArray[np.float64]:
     """(N, number) votes of the samples from the first valid one inwards; sums are 1, or 0 where nothing is valid.
 
     Parameters

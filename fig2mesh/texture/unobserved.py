@@ -16,16 +16,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.counters import count
-from fig2mesh.field.body import Body
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.nets.head_hsv import HeadHsv, enhance
 from fig2mesh.nets.texture_fill import TextureFill, fill_inputs, sample
 from fig2mesh.nets.uv_unet import UvUnet, infer_uv
 from fig2mesh.nets.view_refine import ViewRefine, refine
-from fig2mesh.records import Pose3D
 from fig2mesh.skeleton import PART
-from fig2mesh.texture.majority import UnobservedPoints
-from fig2mesh.texture.sides import SideViews, trace_sides
+from fig2mesh.texture.sides import SideViews
 from fig2mesh.texture.space import inwards, shown_alike, spread, trust
 
 SMOOTH_PX: Final = 2.5
@@ -130,20 +127,3 @@ def paint(sides: SideViews, front: NDArray[np.float32], nets: TextureNets) -> ND
             made = torch.where((labels[1:] == PART["head"])[:, None], heads, made)
         painted = torch.cat([painted[:1], made])
     return np.asarray(255 * painted.movedim(1, 3).numpy(), np.float32)
-
-
-def unobserved_sides(
-    body: Body, pose: Pose3D, picture: NDArray[np.float32], frame: ImageFrame, nets: TextureNets
-) -> UnobservedPoints:
-    """Points of the left, back and right of a body, and the locations of their colours by the networks.
-
-    picture : (H, W, 3) 0-255, the drawing with its colours continued beyond the silhouette
-    """
-    sides = trace_sides(body, pose)
-    front = front_picture(picture, frame, sides)
-    change = place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
-    used = inwards(sides.labels > 0) > MIN_INNER_PX
-    used[0] = False
-    points = sides.points[used][:, :2]
-    found = points + change[used] * np.array([sides.half, -sides.half], np.float32)
-    return UnobservedPoints(sides.shown[used], points, found.astype(np.float32))

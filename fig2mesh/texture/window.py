@@ -47,7 +47,7 @@ class Window:
     def _on(self, canvas: Canvas) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         row = (canvas.corner[1] - self.corner[1]) / canvas.pitch + np.arange(self.shape[0]) * (PITCH / canvas.pitch)
         column = (self.corner[0] - canvas.corner[0]) / canvas.pitch + np.arange(self.shape[1]) * (PITCH / canvas.pitch)
-        return row, column
+        return np.asarray(row, np.float64), np.asarray(column, np.float64)
 
     def of_picture(self, image: NDArray[np.generic]) -> NDArray[np.generic]:
         """Nearest pixels of a picture, continued by its border."""

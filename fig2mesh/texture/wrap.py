@@ -136,7 +136,9 @@ def rim_colours(sheet: Sheet, front: NDArray[np.int_]) -> RimColours:
     votes, near_votes = (np.where(seen[:, None], counted, hidden) for counted in (votes, near_votes))
     material, share = decided(rim, near_votes, votes, sheet.pitch)
     if sheet.face is not None and sheet.skin is not None:
-        covered = covered_rim(material, rim.smoothed(votes, SMOOTH / sheet.pitch), sheet.face.above[place][:, 0], sheet.skin)
+        covered = covered_rim(
+            material, rim.smoothed(votes, SMOOTH / sheet.pitch), sheet.face.above[place][:, 0], sheet.skin
+        )
         material = np.where(sheet.head[place][:, 0], covered, material)
     return RimColours(rim, material, share)
 
@@ -178,10 +180,10 @@ def back_materials(sheet: Sheet, colours: RimColours, front: NDArray[np.int_]) -
         kept = np.where(beyond, -1, np.where(fixed >= 0, fixed, first))
         share = diffused(sheet.region, sheet.region & (kept >= 0), one_hot(kept, sheet.number), sheet.axis, ANISOTROPY)
         share[beyond, first[beyond]] = 0.0
-    return _covered(sheet, share)
+    return covered(sheet, share)
 
 
-def _covered(sheet: Sheet, share: NDArray[np.float64]) -> NDArray[np.float64]:
+def covered(sheet: Sheet, share: NDArray[np.float64]) -> NDArray[np.float64]:
     """Shares without skin on the back of a head that has hair."""
     if sheet.face is None or sheet.skin is None:
         return share
@@ -196,7 +198,8 @@ def _covered(sheet: Sheet, share: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _without_earrings(sheet: Sheet, rim: Rim, run: Run) -> Run:
     """Give a short run beside a face, an earring or an ear, the colour of the hair."""
-    assert sheet.face is not None and sheet.skin is not None
+    assert sheet.face is not None
+    assert sheet.skin is not None
     if run.material < 0 or len(run.members) * sheet.pitch > EARRING * sheet.face.radius:
         return run
     place = tuple(np.clip(np.round(rim.points[run.members]).astype(int), 0, np.array(sheet.region.shape) - 1).T)
@@ -261,4 +264,4 @@ def settled(share: NDArray[np.float64], region: NDArray[np.bool_], pitch: float)
     result = np.zeros_like(spread)
     for k in used:
         result[..., k] = ndimage.gaussian_filter(spread[..., k], BLUR / pitch)
-    return result
+    return np.asarray(result)

@@ -66,7 +66,7 @@ def scene_of(
 def _check(request: ViewRequest) -> None:
     output = request.output
     if request.textures == "none":
-        raise InputError("--textures", "view requires textures, not none", "use network or plain")
+        raise InputError("--textures", "view requires textures, not none", "use wrap")
     if output is not None:
         if output.suffix.lower() not in (".html", ".htm"):
             raise OutputError(output, "unknown suffix", "give -o a name that ends in .html")

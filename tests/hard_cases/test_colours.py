@@ -141,6 +141,6 @@ def test_palettes_and_pens_of_tiny_pictures(worst: Worst, drawn_picture: tuple[n
     "of 255",
 )
 def test_one_colour_with_networks(job: Job, worst: Worst, colour: tuple[int, ...]) -> None:
-    made = job(painted(MASK, colour), None, "--parts", "network", "--textures", "network", mask=MASK)
+    made = job(painted(MASK, colour), None, "--parts", "network", "--textures", "wrap", mask=MASK)
     assert made.code == 0, made.error
     worst(np.abs(texture(job) - colour[:3]).max())

@@ -130,7 +130,7 @@ def test_hard_joints_with_networks(job: Job, kind: str) -> None:
         "hidden": joints_on(200, 300, visible=0),
         "line": {name: [100, y, 1] for name, (_, y, _) in PLAIN.items()},
     }[kind]
-    made = job(painted(MASK), joints, "--parts", "network", "--textures", "network")
+    made = job(painted(MASK), joints, "--parts", "network", "--textures", "wrap")
     assert made.code == 0, made.error
     assert made.measures["watertight"]
     assert made.measures["components"] == 1

@@ -1,7 +1,7 @@
 """Colours that a conversion bakes on unseen sides, on bodies whose true shape is known.
 
-The front of a `TexturedSubject` goes through the stages of a conversion that decide colours: splitting into layers,
-finding areas, inference by networks. Shapes stay the true ones, so that results can be compared pixel by pixel.
+The front of a `TexturedSubject` goes through the stages of a conversion that decide colours: splitting into layers and
+continuing their colours from the rim. Shapes stay the true ones, so that results can be compared pixel by pixel.
 """
 
 from __future__ import annotations
@@ -19,10 +19,7 @@ from fig2mesh.parts.split import split
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import Figure
 from fig2mesh.skeleton import JOINT
-from fig2mesh.texture.majority import UnobservedPoints
 from fig2mesh.texture.sources import Sources, make_sources
-from fig2mesh.texture.space import inwards
-from fig2mesh.texture.unobserved import MIN_INNER_PX
 from fig2mesh.training.samples.textured_subject import TexturedSubject
 
 CANVAS_PX: Final = 512
@@ -33,22 +30,19 @@ MIN_DEPTH_GAP: Final = 0.02
 TEXTURE: Final = 1024
 
 
-def baked_sides(subject: TexturedSubject, found: NDArray[np.floating]) -> NDArray[np.float32]:
-    """(4, H, W, 3) 0-255, colours of the texels visible from each side.
-
-    found : (4, H, W, 2) positions in the front from which networks take the colours, see `Sides.places`
-    """
+def baked_sides(subject: TexturedSubject) -> NDArray[np.float32]:
+    """(4, H, W, 3) 0-255, colours of the texels visible from each side."""
     sides = subject.sides
     size = sides.labels.shape[1]
     straight = _pixels(sides.places(), size)
-    sources = _sources(subject, straight, _pixels(found, size))
+    sources = _sources(subject)
     pixel = np.clip(straight.astype(int), 0, size - 1)
     depth = np.where(sides.labels[0] > 0, sides.points[0, ..., 2], -np.inf)
     drawn = sides.points[..., 2] >= depth[pixel[..., 1], pixel[..., 0]] - MIN_DEPTH_GAP
     drawn[2] = False
     result = sources.seen[pixel[..., 1], pixel[..., 0]]
     for label in np.unique(sides.shown[sides.shown > 0]):
-        picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
+        picture = sources.back.get(int(label), next(iter(sources.back.values())))
         own = ~drawn & (sides.shown == label)
         at = np.clip((straight[own] * sources.plain_scale).astype(int), 0, np.array(picture.shape[1::-1]) - 1)
         result[own] = picture[at[:, 1], at[:, 0]]
@@ -60,7 +54,7 @@ def _pixels(places: NDArray[np.floating], size: int) -> NDArray[np.float64]:
     return np.asarray((np.asarray(places, np.float64) + 1) / 2 * size)
 
 
-def _sources(subject: TexturedSubject, straight: NDArray[np.float64], found: NDArray[np.float64]) -> Sources:
+def _sources(subject: TexturedSubject) -> Sources:
     sides = subject.sides
     mask = sides.labels[0] > 0
     rgba = np.full((*mask.shape, 4), 255, np.uint8)
@@ -73,8 +67,4 @@ def _sources(subject: TexturedSubject, straight: NDArray[np.float64], found: NDA
     joints = lift(figure, frame).joints.astype(np.float64)
     divided = split(canvas, joints, visible)
     outline = Outline((), divided, raise_layers(canvas, divided, joints, "cpu"), canvas)
-    used = inwards(sides.labels > 0) > MIN_INNER_PX
-    used[0] = False
-    points, named = (frame.figure_from_image(pixels[used]).astype(np.float32) for pixels in (straight, found))
-    unseen = UnobservedPoints(sides.shown[used], points, named)
-    return make_sources(figure, frame, outline, TEXTURE, 0, lambda picture: unseen)
+    return make_sources(figure, frame, outline, TEXTURE, 0)

@@ -90,7 +90,7 @@ def painted(subject: TexturedSubject, method: str, nets: TextureNets) -> tuple[F
     if method == COORDINATES:
         return _sampled(front, found), found
     if method == BAKED:
-        return baked_sides(subject, found), straight
+        return baked_sides(subject), straight
     return _in_drawn_colours(paint(sides, front, replace(nets, head=None)), found, front, seen)
 
 

@@ -109,7 +109,7 @@ def test_without_textures_no_texture_network_runs(
 
     monkeypatch.setattr("fig2mesh.texture.unobserved.shipped", refuse)
     arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "--quality", "draft", "-q"]
-    for name, textures in (("plain", "plain"), ("none", "none")):
+    for name, textures in (("wrap", "wrap"), ("none", "none")):
         report = tmp_path / f"{name}.json"
         made = ["--textures", textures, "-o", str(tmp_path / f"{name}.glb"), "--report", str(report)]
         assert main([*arguments, *made]) == 0

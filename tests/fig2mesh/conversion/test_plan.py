@@ -15,7 +15,7 @@ from fig2mesh.stages.table import STAGES
 
 @pytest.mark.parametrize(
     ("mesher", "textures", "parts"),
-    list(product(["ball-pivot", "isosurface"], ["network", "plain", "none"], ["network", "outline"])),
+    list(product(["ball-pivot", "isosurface"], ["wrap", "none"], ["network", "outline"])),
 )
 def test_the_pipeline_runs_what_is_planned(mesher: str, textures: str, parts: str) -> None:
     settings = settings_for("draft", mesher=mesher, textures=textures, parts=parts)
@@ -37,7 +37,7 @@ def test_the_pipeline_runs_what_is_planned(mesher: str, textures: str, parts: st
         ("a.glb", "none", None, True),
         ("a.ply", "none", False, True),
         ("a.usdz", "none", False, True),
-        ("a.glb", "plain", None, True),
+        ("a.glb", "wrap", None, True),
     ],
 )
 def test_normals_are_for_what_is_lit(output: str, textures: str, light: bool | None, expected: bool) -> None:

@@ -78,7 +78,7 @@ OPTIONS = st.fixed_dictionaries(
     optional={
         "lonlat": st.tuples(st.floats(-180, 180), st.floats(-90, 90)),
         "quality": st.sampled_from(["draft", "standard", "fine"]),
-        "textures": st.sampled_from(["network", "plain", "none"]),
+        "textures": st.sampled_from(["wrap", "none"]),
         "triangles": st.integers(200, 2_000_000),
         "bbox": st.tuples(*[st.integers(0, 9999)] * 4),
         "evidence": st.booleans(),

@@ -26,27 +26,27 @@ def area(marks: list[tuple[int, int]]) -> Drawn:
 
 def test_dots_all_over_are_a_pattern() -> None:
     index, kind, own = area([(r, c) for r in range(18, 104, 10) for c in range(18, 104, 10)])
-    found = patterned(index, kind, own, WINDOW)
+    found = patterned(index, kind, own, own, WINDOW)
     assert found[20:100, 20:100].all()
     assert not found[~own].any()
 
 
 def test_a_row_of_buttons_is_none() -> None:
     index, kind, own = area([(r, 60) for r in range(18, 104, 10)])
-    assert not patterned(index, kind, own, WINDOW).any()
+    assert not patterned(index, kind, own, own, WINDOW).any()
 
 
 def test_the_contour_is_no_mark() -> None:
     index, kind, own = area([])
     index[10:12] = index[-12:-10] = 1
     index[:, 10:12] = index[:, -12:-10] = 1
-    assert not patterned(index, kind, own, WINDOW).any()
+    assert not patterned(index, kind, own, own, WINDOW).any()
 
 
 def test_each_area_is_judged_alone() -> None:
     """The upper half has dots, the lower another colour and none."""
     index, kind, own = area([(r, c) for r in range(18, 56, 8) for c in range(18, 104, 8)])
     kind[60:], index[60:] = 2, 2
-    found = patterned(index, kind, own, WINDOW)
+    found = patterned(index, kind, own, own, WINDOW)
     assert found[20:50, 20:100].all()
     assert not found[62:].any()

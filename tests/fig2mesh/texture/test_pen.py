@@ -8,7 +8,7 @@ import pytest
 from fig2mesh.field import analytic
 from fig2mesh.field.body import Body
 from fig2mesh.mesh.bake import crease_ink
-from fig2mesh.texture.pen import Pen, find_pen, reinked, without_contour
+from fig2mesh.texture.pen import Pen, find_pen, lined_pairs, reinked, without_contour
 
 PALETTE = np.array([[250, 250, 250], [200, 40, 40], [40, 200, 60], [10, 10, 10], [215, 60, 50]], np.float32)
 WHITE, RED, GREEN, INK, PINK = range(5)
@@ -52,7 +52,7 @@ def test_drawings_without_contours_have_no_pen() -> None:
 def test_areas_meet_in_a_line_where_they_do_in_the_drawing() -> None:
     kind, own = flag()
     pen = find_pen(PALETTE, kind, WEIGHT, own)
-    picture = reinked(PALETTE, plain(), own, pen)
+    picture = reinked(PALETTE, plain(), lined_pairs(PALETTE, plain(), own, pen), pen)
     column = np.linalg.norm(picture[:, 30] - PALETTE[INK], axis=1)
     dark = np.flatnonzero(column < 60)
     assert 38 <= dark.min() <= dark.max() <= 42
@@ -64,13 +64,17 @@ def test_areas_meet_in_a_line_where_they_do_in_the_drawing() -> None:
 def test_shades_do_not_meet_in_lines(lower: int) -> None:
     _, own = flag()
     pen = Pen(PALETTE[INK], LINE, np.ones(own.shape, bool))
-    np.testing.assert_array_equal(reinked(PALETTE, plain(lower), own, pen), PALETTE[plain(lower)])
+    np.testing.assert_array_equal(
+        reinked(PALETTE, plain(lower), lined_pairs(PALETTE, plain(lower), own, pen), pen), PALETTE[plain(lower)]
+    )
 
 
 def test_borders_that_are_not_drawn_stay_without_lines() -> None:
     _, own = flag()
     pen = Pen(PALETTE[INK], LINE, np.zeros(own.shape, bool))
-    np.testing.assert_array_equal(reinked(PALETTE, plain(), own, pen), PALETTE[plain()])
+    np.testing.assert_array_equal(
+        reinked(PALETTE, plain(), lined_pairs(PALETTE, plain(), own, pen), pen), PALETTE[plain()]
+    )
 
 
 def test_corners_between_limbs_are_inked_and_round_limbs_are_not() -> None:

@@ -14,7 +14,7 @@ from fig2mesh.parts.canvas import make_canvas
 from fig2mesh.parts.outline import outline_parts
 from fig2mesh.pose.prior import lift
 from fig2mesh.records import Figure
-from fig2mesh.skeleton import JOINT, JOINT_NAMES, PART
+from fig2mesh.skeleton import JOINT, JOINT_MIRROR, JOINT_NAMES, PART, PART_MIRROR
 from fig2mesh.texture.sources import Sources, continued, make_sources
 from tests.drawn import JOINTS, draw_figure
 
@@ -57,11 +57,11 @@ def near(picture: np.ndarray, colour: tuple[int, int, int], tolerance: float = 4
 
 def at(sources: Sources, part: str, joint: str) -> np.ndarray:
     x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS[joint])
-    return sources.plain[PART[part]][y, x]
+    return sources.back[PART[part]][y, x]
 
 
 def test_fills_stay_and_ink_goes(sources: Sources) -> None:
-    shirt = sources.plain[PART["torso"]]
+    shirt = sources.back[PART["torso"]]
     x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS["thorax"])
     window = shirt[y - 10 : y + 60, x - 20 : x + 20]
     assert near(window, (200, 40, 40)).mean() > 0.99
@@ -71,7 +71,7 @@ def test_fills_stay_and_ink_goes(sources: Sources) -> None:
 
 
 def test_no_face_on_the_back_of_the_head(sources: Sources, figure: Figure) -> None:
-    head = sources.plain[PART["head"]]
+    head = sources.back[PART["head"]]
     assert near(head, EYE, 60).sum() == 0
     x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS["head"])
     assert near(head[y + 8, x], HAIR), "hair is carried on over the face"
@@ -80,7 +80,7 @@ def test_no_face_on_the_back_of_the_head(sources: Sources, figure: Figure) -> No
 def test_faceless_heads_keep_their_colours(figure: Figure) -> None:
     visible = figure.visible.copy()
     visible[JOINT["eyes"]] = False
-    head = colours_of(replace(figure, visible=visible)).plain[PART["head"]]
+    head = colours_of(replace(figure, visible=visible)).back[PART["head"]]
     x, y = (int(SCALE * c) for c in JOINTS["head"])
     assert near(head[y + 34, x], (230, 180, 150))
 
@@ -99,6 +99,42 @@ def make_sources_seen(figure: Figure) -> np.ndarray:
 def test_deterministic(figure: Figure, sources: Sources) -> None:
     again = colours_of(figure)
     assert all(np.array_equal(sources.plain[part], again.plain[part]) for part in sources.plain)
+    assert all(np.array_equal(sources.back[part], again.back[part]) for part in sources.back)
+
+
+def test_mirrored_drawings_have_mirrored_backs(figure: Figure, sources: Sources) -> None:
+    joints = figure.joints_px[list(JOINT_MIRROR)] * (-1, 1) + (figure.mask.shape[1], 0)
+    turned = replace(figure, rgba=figure.rgba[:, ::-1], mask=figure.mask[:, ::-1], joints_px=joints)
+    mirrored = colours_of(turned)
+    for part in ("torso", "head", "l_hand", "r_lower_leg"):
+        here, there = sources.back[PART[part]], mirrored.back[PART_MIRROR[PART[part]]][:, ::-1]
+        apart = np.linalg.norm(here - there, axis=-1) > 60
+        assert apart[figure.mask].mean() < 0.03
+
+
+def test_flat_colours_are_exact(sources: Sources) -> None:
+    shirt = sources.back[PART["torso"]]
+    x, y = (int(SCALE * c * sources.plain_scale) for c in JOINTS["thorax"])
+    np.testing.assert_array_equal(shirt[y + 20, x], (200, 40, 40))
+
+
+BUTTON, BELT = (250, 250, 60), (90, 20, 120)
+
+
+def test_belts_go_round_and_buttons_do_not(figure: Figure) -> None:
+    image = draw_figure(SCALE)
+    pen = ImageDraw.Draw(image)
+    x, y = (SCALE * c for c in JOINTS["thorax"])
+    for row in range(4):
+        pen.ellipse((x - 5, y + 18 * row, x + 5, y + 18 * row + 10), fill=BUTTON)
+    waist = (y + SCALE * JOINTS["pelvis"][1]) // 2 + 20
+    pen.rectangle((0, waist, 2000, waist + 16), fill=BELT)
+    rgba = np.asarray(image).copy()
+    rgba[..., 3] = figure.rgba[..., 3]
+    back = colours_of(replace(figure, rgba=rgba)).back[PART["torso"]]
+    torso = back[y : waist + 40, x - 20 : x + 20]
+    assert near(torso, BUTTON, 60).sum() == 0
+    assert near(back[waist + 8, x - 15 : x + 15], BELT).all()
 
 
 PAPER, RED = (240, 235, 225), (200, 40, 40)

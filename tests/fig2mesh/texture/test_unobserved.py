@@ -25,7 +25,6 @@ from fig2mesh.texture.unobserved import (
     paint,
     place_changes,
     texture_coordinates,
-    unobserved_sides,
 )
 from fig2mesh.training.networks.loop import seeded
 
@@ -133,12 +132,3 @@ def test_untrained_networks_paint_the_front_straight_through(sides: SideViews) -
     # The box is not quite symmetric to the pixels: compare where both sides see the body.
     mirrored = front[:, ::-1]
     assert np.abs(made[2][back] - mirrored[back]).mean() < 1.0
-
-
-def test_only_sides_that_the_drawing_does_not_show_are_told_of(body: Body) -> None:
-    frame = ImageFrame((50.0, 60.0), 0.01)
-    picture = np.full((120, 100, 3), 80.0, np.float32)
-    found = unobserved_sides(body, POSE, picture, frame, replace(networks(), head=None))
-    assert set(np.unique(found.labels)) == {PART["head"], PART["torso"]}
-    assert len(found.labels) == len(found.points) == len(found.found) > 10_000
-    np.testing.assert_allclose(found.found, found.points, atol=1e-6)

@@ -18,7 +18,7 @@ from fig2mesh.tradeoff.report import COLUMNS
 from fig2mesh.tradeoff.sweep import FINEST, KNOBS, STAGES_OF, requests
 from tests.drawn import DrawnFiles, write_figure
 
-CHEAP = replace(PRESETS["draft"], parts="outline", textures="plain", mesher="isosurface", voxel=0.02, texture_size=128)
+CHEAP = replace(PRESETS["draft"], parts="outline", textures="wrap", mesher="isosurface", voxel=0.02, texture_size=128)
 
 
 @pytest.fixture
