@@ -20,6 +20,12 @@ CHIN = 0.75
 CHIN_RADII = (0.9, 1.5)
 """Bounds of the chin's distance from the middle of the head, radii of the head."""
 
+FRONTAL = (0.3, 0.6)
+"""Distance of the eyes from the axis up to which a face looks at the viewer, and from which it does not, radii."""
+
+AWAY = 0.3
+"""Least distance of the eyes behind the middle of a head that is seen from behind, radii of the head."""
+
 PROFILE = 0.5
 """Least distance of the eyes from the axis of a head in profile, radii of the head."""
 
@@ -33,6 +39,7 @@ class HeadFrame:
     radius : half width, FIGURE units
     chin : height of the chin, negative
     eyes : (across, along) the axis
+    facing : 1 where the face looks at the viewer, 0 in profile, -1 where it looks away
     """
 
     middle: NDArray[np.float64]
@@ -40,6 +47,7 @@ class HeadFrame:
     radius: float
     chin: float
     eyes: tuple[float, float]
+    facing: float = 1.0
 
     @property
     def looks(self) -> int:
@@ -69,6 +77,9 @@ def head_frame(canvas: Canvas, joints: NDArray[np.float64]) -> HeadFrame:
     length = float(np.linalg.norm(bone))
     up = bone / length if length > MIN_BONE * radius else np.array([0.0, 1.0])
     chin = -float(np.clip(CHIN * length, CHIN_RADII[0] * radius, CHIN_RADII[1] * radius))
-    bare = HeadFrame(middle, up, radius, chin, (0.0, 0.0))
-    across, along = bare.coordinates(eyes)
-    return HeadFrame(middle, up, radius, chin, (float(across), float(along)))
+    offset = eyes - middle
+    across, along = float(offset @ [up[1], -up[0]]), float(offset @ up)
+    turned = (FRONTAL[1] - abs(across) / radius) / (FRONTAL[1] - FRONTAL[0])
+    away = joints[JOINT["eyes"], 2] - joints[JOINT["head"], 2] < -AWAY * radius
+    facing = float(np.clip(turned, 0.0, 1.0)) * (-1.0 if away else 1.0)
+    return HeadFrame(middle, up, radius, chin, (across, along), facing)

@@ -18,6 +18,9 @@ from fig2mesh.skeleton import PART
 DEEPEST = 1.5
 """Half depth of a head towards which very wide hair and luggage are bounded, radii of the head."""
 
+THROAT = 0.65
+"""Largest distance of the throat from the middle of the neck, radii of the head: long hair hangs behind it."""
+
 SHARPNESS = 6
 """Exponent of the union of a head with its lobes: larger is sharper."""
 
@@ -46,6 +49,7 @@ class RaisedHead:
     brim : (H, W) squared half thickness of the brim of a hat, FIGURE units²
     near : (H, W) 1 on the head and what hangs around the neck, 0 away from them
     deepest : half depth of what hangs around the neck, FIGURE units
+    facing : see `HeadFrame`
     """
 
     u: NDArray[np.float64]
@@ -53,11 +57,22 @@ class RaisedHead:
     brim: NDArray[np.float64]
     near: NDArray[np.float64]
     deepest: float
+    facing: float
 
     def joined(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Squared half thickness of the layer with the head, from that of the inflated layer."""
         below = u + self.near * (bounded(u, self.deepest) - u)
         return np.asarray(below + self.weight * (self.u - below))
+
+    def behind_neck(
+        self, u: NDArray[np.float64], z0: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Squared half thickness and middle, with what hangs beside the neck behind it rather than in front of it."""
+        half = np.sqrt(np.maximum(u, 0.0))
+        front = np.sqrt(bounded(half**2, THROAT * self.deepest))
+        share = abs(self.facing) * np.clip(self.near - self.weight, 0.0, 1.0)
+        lost = share * (half - front) / 2
+        return np.where(u > 0, (half - lost) ** 2, u), z0 - np.sign(self.facing) * lost
 
     def bounded_ratio(self, ratio: NDArray[np.float64]) -> NDArray[np.float64]:
         """Ratio of thickness that leaves a head below a brim inside it."""
@@ -103,7 +118,7 @@ def raise_head(
     weight = ndimage.gaussian_filter(head.astype(float), blur) / np.maximum(cover, 1e-6)
     rise = np.clip((along - frame.chin) / (NECK * radius) + 0.6, 0.0, 1.0)
     near = np.clip(weight, 0.0, 1.0)
-    return RaisedHead(u, near * rise * rise * (3.0 - 2.0 * rise), disc, near, radius)
+    return RaisedHead(u, near * rise * rise * (3.0 - 2.0 * rise), disc, near, radius, frame.facing)
 
 
 def bounded(u: NDArray[np.float64], half: float) -> NDArray[np.float64]:

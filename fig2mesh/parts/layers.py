@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.bones import Bones, core_bones, out_of_cloth
-from fig2mesh.parts.canvas import Canvas, raster_distance
-from fig2mesh.parts.cross_section import CrossSection, measure_cross_section
-from fig2mesh.parts.depth import mid_surface, place_limb
-from fig2mesh.parts.distances import closing
-from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
-from fig2mesh.parts.head_frame import HeadFrame, head_frame
-from fig2mesh.parts.heads import RaisedHead, raise_head
-from fig2mesh.parts.inflate import inflate
+from fig2mesh.parts.canvas import Canvas
+from fig2mesh.parts.depth import place_limb
+from fig2mesh.parts.head_frame import head_frame
 from fig2mesh.parts.joining import floating
+from fig2mesh.parts.layer_inflation import LayerInflation, LayerSurface
 from fig2mesh.parts.limbs import Limb
-from fig2mesh.parts.loads import load_of, part_loads
+from fig2mesh.parts.loads import part_loads
 from fig2mesh.parts.props import prop_depth
-from fig2mesh.parts.rim import RIM_BLUR, extended, rim_distance
 from fig2mesh.parts.split import Layer, Split
 from fig2mesh.records import PartSdf
 from fig2mesh.skeleton import JOINT, PART
 
 STANDING_FOOT_UNITS = 0.12
 """Largest height of a standing foot's tip above the lowest point of the figure, FIGURE units."""
-
-NOOK = 0.045
-"""Half width of the nooks of a head's outline that are left out of its depth, FIGURE units."""
 
 _FLAT = Bones(np.zeros((1, 2)), np.zeros(1), np.zeros(1))
 
@@ -40,22 +32,6 @@ the way."""
 
 REACH_STEP = 0.012
 """Growth of a floating limb into its neighbours with each attempt, FIGURE units."""
-
-
-@dataclass(frozen=True)
-class LayerSurface:
-    """Layer in depth: it fills z0 − √u … z0 + √u.
-
-    u : (H, W) float64, squared half thickness in FIGURE units², negative outside the outline
-    z0 : (H, W) float64, FIGURE z of its middle
-    labels : (H, W) uint8, part of each pixel, 0 outside the region
-    clip : (H, W) float64, signed distance to flat ends, positive beyond them, FIGURE units; None where there are none
-    """
-
-    u: NDArray[np.float64]
-    z0: NDArray[np.float64]
-    labels: NDArray[np.uint8]
-    clip: NDArray[np.float64] | None = None
 
 
 def raise_layers(
@@ -79,7 +55,7 @@ def raise_layers(
     props = [layer for layer in others if layer.limb is None]
     bones = core_bones(canvas, divided, joints)
     flat = _may_end_flat(canvas, divided, joints)
-    make = _Inflation(canvas, loads, flat, device, fields, head_frame(canvas, joints))
+    make = LayerInflation(canvas, loads, flat, device, fields, head_frame(canvas, joints))
     surfaces = [make(core, bones)]
     layers: list[Layer] = [core]
     limbs: list[Limb | None] = [None]
@@ -115,107 +91,6 @@ def raise_layers(
     return _joined(canvas, layers, limbs, surfaces, make)
 
 
-class _Inflation:
-    """Inflation of layers around their bones; the networks' cross-section of a layer is measured once."""
-
-    def __init__(
-        self,
-        canvas: Canvas,
-        loads: NDArray[np.float64],
-        flat: NDArray[np.uint8],
-        device: str,
-        fields: tuple[PartSdf, ...],
-        frame: HeadFrame,
-    ) -> None:
-        self.canvas, self.loads, self.flat, self.device, self.fields = canvas, loads, flat, device, fields
-        self.frame = frame
-        self.cross_sections: dict[str, CrossSection | None] = {}
-        self.heads: dict[str, RaisedHead | None] = {}
-
-    def __call__(self, layer: Layer, bones: Bones) -> LayerSurface:
-        canvas = self.canvas
-        if layer.name not in self.cross_sections:
-            # The networks' parts lie where the joints are, also where the limb has been moved since.
-            self.cross_sections[layer.name] = self._cross_section(
-                layer, bones if layer.limb is None else Bones.of(layer.limb)
-            )
-        cross_section = self.cross_sections[layer.name]
-        ends = flat_ends(canvas, layer.region, np.isin(layer.labels, self.flat))
-        rim = rim_distance(canvas, layer.region, ends)
-        head = self._head(layer, rim[: len(layer.region)])
-        u = self._raised(layer.region, layer.labels, bones, ends, rim, head)
-        u = extended(rim[: len(u)], u, canvas.pitch)
-        z0 = mid_surface(canvas, bones.points, bones.depth)
-        if cross_section is not None:
-            ratio = cross_section.ratio if head is None else head.bounded_ratio(cross_section.ratio)
-            u, z0 = u * ratio, z0 + cross_section.offset
-        if head is not None and head.brim.any():
-            u = extended(rim[: len(u)], np.where(rim[: len(u)] < 0, np.maximum(u, head.brim), 0.0), canvas.pitch)
-        return LayerSurface(u, z0, layer.labels, None if ends is None else clip_distance(canvas, layer.region, ends))
-
-    def _raised(
-        self,
-        region: NDArray[np.bool_],
-        labels: NDArray[np.uint8],
-        bones: Bones,
-        ends: Ends | None,
-        rim: NDArray[np.float64],
-        head: RaisedHead | None,
-    ) -> NDArray[np.float64]:
-        """(H, W) squared half thickness of an inflated outline, FIGURE units²; 0 outside its `rim_distance`."""
-        height = len(region)
-        if ends is not None:
-            below = labels[np.maximum(ends.source, 0), np.arange(region.shape[1])]
-            rows = ((0, ends.extra), (0, 0))
-            labels = np.where(ends.beyond, below, np.pad(labels, rows))
-            region = np.pad(region, rows) | ends.beyond
-        load = load_of(region, labels, self.loads, self.canvas.pitch)
-        steep = mid_surface(self.canvas, bones.points, bones.slope2)
-        u = inflate(rim < 0, load, self.device, rim)[:height] * self.canvas.pitch**2
-        if (labels == PART["head"]).any():
-            u = self._without_grooves(region[:height], labels[:height], u, rim[:height])
-        if head is not None:
-            u = np.where(rim[:height] < 0, head.joined(u), 0.0)
-        return np.asarray(u * (1.0 + np.maximum(steep, 0.0)))
-
-    def _head(self, layer: Layer, rim: NDArray[np.float64]) -> RaisedHead | None:
-        if layer.name != "core":
-            return None
-        if layer.name not in self.heads:
-            self.heads[layer.name] = raise_head(self.canvas, self.frame, layer.region, layer.labels, rim, self.device)
-        return self.heads[layer.name]
-
-    def _without_grooves(
-        self, region: NDArray[np.bool_], labels: NDArray[np.uint8], u: NDArray[np.float64], rim: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Inflate a head so that its nooks (below a nose, between locks of hair) stay at its rim and do not run across.
-
-        The head is inflated with its nooks filled, and brought to zero at the drawn rim by the ratio of the distances
-        to the two rims: 1 where they agree, and nearly 1 from twice a nook's depth inwards.
-        """
-        pitch = self.canvas.pitch
-        head = labels == PART["head"]
-        filled = closing(head, NOOK / pitch) | region
-        _, nearest = ndimage.distance_transform_edt(~region, return_indices=True)
-        load = load_of(filled, labels[tuple(nearest)], self.loads, pitch)
-        outer = np.minimum(rim, ndimage.gaussian_filter(raster_distance(filled), RIM_BLUR / pitch) * pitch)
-        smooth = inflate(outer < 0, load, self.device, outer) * pitch**2
-        share = 1.0 - (1.0 - np.clip(rim / np.minimum(outer, -1e-9), 0.0, 1.0)) ** 3
-        weight = ndimage.gaussian_filter(head.astype(float), NOOK / pitch)
-        return np.asarray(np.where(rim < 0, u + weight * (np.maximum(u, smooth * share) - u), 0.0))
-
-    def _cross_section(self, layer: Layer, bones: Bones) -> CrossSection | None:
-        """Cross-section of a layer by the networks; None where they have none of its parts."""
-        canvas = self.canvas
-        own = [field for field in self.fields if (layer.labels == field.part).any()]
-        if not own:
-            return None
-        rim = rim_distance(canvas, layer.region, None)
-        reference = self._raised(layer.region, layer.labels, bones, None, rim, self._head(layer, rim))
-        bone = mid_surface(canvas, bones.points, bones.depth)
-        return measure_cross_section(canvas, layer.labels, own, reference, bone)
-
-
 def _may_end_flat(canvas: Canvas, divided: Split, joints: NDArray[np.float64]) -> NDArray[np.uint8]:
     """Labels of pixels that may end flat: garments that legs come out of or that hide them, feet on the ground."""
     ground = canvas.points()[canvas.inside][:, 1].min()
@@ -235,7 +110,7 @@ def _joined(
     layers: list[Layer],
     limbs: list[Limb | None],
     surfaces: list[LayerSurface],
-    make: _Inflation,
+    make: LayerInflation,
 ) -> tuple[LayerSurface, ...]:
     """Move floating limbs back towards the middle of the body until they are joined."""
     for attempt in range(ATTEMPTS):

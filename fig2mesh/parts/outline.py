@@ -21,7 +21,8 @@ from fig2mesh.errors import FigureError
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.fillets import make_fillets
 from fig2mesh.parts.inflate import single_threaded
-from fig2mesh.parts.layers import LayerSurface, raise_layers
+from fig2mesh.parts.layer_inflation import LayerSurface
+from fig2mesh.parts.layers import raise_layers
 from fig2mesh.parts.network import hidden_parts
 from fig2mesh.parts.split import Split, split
 from fig2mesh.records import BoolArray, PartSdf, Pose3D

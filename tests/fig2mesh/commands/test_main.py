@@ -169,7 +169,7 @@ def test_internal_errors_are_not_input_errors(
         raise ZeroDivisionError("planted")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("fig2mesh.parts.layers.inflate", broken)
+    monkeypatch.setattr("fig2mesh.parts.layer_inflation.inflate", broken)
     assert main(arguments(files)) == 1
     message = capfd.readouterr().err
     assert "internal error: ZeroDivisionError: planted" in message
