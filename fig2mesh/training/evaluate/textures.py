@@ -1,7 +1,8 @@
 """Textures of held-out bodies: texture coordinates (table 4), and the sides that a drawing hides.
 
 The sides are made from the front picture alone and compared with the drawn sides of the training data.
-Shapes, labels and depths are the true ones, so that textures alone are measured.
+Shapes, labels and depths are the true ones, so that networks alone are measured; for conversions see
+`fig2mesh.evaluate.backs`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape
 from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
 from fig2mesh.texture.unobserved import TextureNets, paint, place_changes, shipped, texture_coordinates
-from fig2mesh.training.evaluate.as_baked import baked_sides
 from fig2mesh.training.evaluate.networks import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.evaluate.paper import UV_SCORES
 from fig2mesh.training.networks.train_uv import scores
@@ -33,9 +33,9 @@ FloatImage = NDArray[np.float32]
 Report = Callable[[str], None]
 
 # fmt: off
-BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
-    "as conversions bake them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
-    "coordinates, refined", "coordinates",
+DRAWN, HEADS, REFINED, COORDINATES = (
+    "coordinates, refined, in colours of the drawing", "coordinates, refined, heads", "coordinates, refined",
+    "coordinates",
 )
 # fmt: on
 # fmt: off
@@ -43,10 +43,10 @@ STRAIGHT, NEAREST, INPAINTED = (
     "straight through the body", "nearest observed point", "OpenCV inpainting in texture space",
 )
 # fmt: on
-METHODS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
+METHODS: Final = (DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
 """Methods that make unseen sides; the last three are baselines."""
 
-PLACED: Final = (BAKED, DRAWN, COORDINATES, STRAIGHT)
+PLACED: Final = (DRAWN, COORDINATES, STRAIGHT)
 """Methods that know the position in the drawing of each colour."""
 
 NEEDS_REFINER: Final = (DRAWN, HEADS, REFINED)
@@ -89,8 +89,6 @@ def painted(subject: TexturedSubject, method: str, nets: TextureNets) -> tuple[F
     found = straight + place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
     if method == COORDINATES:
         return _sampled(front, found), found
-    if method == BAKED:
-        return baked_sides(subject, found), straight
     return _in_drawn_colours(paint(sides, front, replace(nets, head=None)), found, front, seen)
 
 
