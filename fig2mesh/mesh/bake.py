@@ -29,6 +29,9 @@ LINE_REACH = 0.8
 CORNER, CORNER_SOFT = 0.6, 0.2
 """A point lies in a corner where the field's value is below this share of the distance stepped, by a soft threshold."""
 
+FACING_AWAY = 0.1
+"""Range of the normal's z, centred on 0, over which colours of the near side give way to those of the far side."""
+
 CLEARANCE = 2e-3
 """Distance off the surface at which rays start, FIGURE units, so that they do not hit the face they start from."""
 
@@ -159,8 +162,11 @@ def plain_colours(
     color = np.empty((len(points), 3))
     for label in np.unique(labels):
         chosen = labels == label
-        picture = sources.plain.get(int(label), next(iter(sources.plain.values())))
-        color[chosen] = _bilinear(picture, pixels[chosen] * sources.plain_scale)
+        near = sources.plain.get(int(label), next(iter(sources.plain.values())))
+        far = sources.back.get(int(label), near)
+        at = pixels[chosen] * sources.plain_scale
+        away = np.clip(0.5 - normals[chosen, 2:] / FACING_AWAY, 0.0, 1.0)
+        color[chosen] = away * _bilinear(far, at) + (1.0 - away) * _bilinear(near, at)
     if body is not None and sources.pen is not None:
         ink = crease_ink(body, points, normals, sources.pen.width)[:, None]
         color += ink * (sources.pen.colour - color)

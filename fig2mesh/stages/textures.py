@@ -25,10 +25,4 @@ def textures(
     """Pictures from which the bake takes the colours of all texels."""
     frame = image_frame(figure)
 
-    def infer(picture: FloatArray) -> UnobservedPoints:
-        from fig2mesh.texture.unobserved import shipped, unobserved_sides
-
-        return unobserved_sides(body, lift, picture, frame, shipped())
-
-    inferred = infer if textures == "network" else None
-    return make_sources(figure, frame, parts, texture_size, seed, inferred, contours=contours == "keep")
+    return make_sources(figure, frame, parts, texture_size, seed, contours=contours == "keep")

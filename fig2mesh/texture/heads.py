@@ -2,143 +2,174 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from fig2mesh.image_frame import ImageFrame
-from fig2mesh.parts.outline import Outline
+from fig2mesh.parts.canvas import Canvas
 from fig2mesh.records import Figure
 from fig2mesh.skeleton import JOINT
-from fig2mesh.texture.pen import STROKE
 
-FACE_SHARE = 1.05
-"""Half width of the face relative to the head's."""
+FACE: Final = (0.6, -0.9, 0.25)
+"""Half width, bottom and top of the middle of a face about the eyes, face radii."""
 
-MIN_HAIR = 0.04
-"""Least share of the head covered by hair or hat for it to continue over the back."""
+BESIDE: Final = (0.5, 2.2, -0.8, 0.4)
+"""Distances aside and heights about the eyes between which hair hangs beside a face, face radii."""
 
-SHADE = 18.0
-"""Colour tolerance, CIELAB units: nearer colours of a head are light and shade of one thing."""
+CROWN: Final = (1.2, 0.5)
+"""Half width and least height above the eyes of the crown of a head, face radii."""
 
-CHEEKS = (0.3, 0.7)
-"""Start and end of temples and cheeks, shares of the height of the face."""
+MIN_HAIR: Final = 0.03
+"""Least area of hair beside a face, squares of the face radius."""
 
-BRIM = 1.6
-"""Width of hats relative to faces."""
+BRIM: Final = 1.6
+"""Half width of a hat with a brim, face radii: what is below it is not hidden by the hat."""
 
-FILLED = 0.4
-"""Least share of an area that has its colour: mixed rims of lines dominate where nothing else does."""
+NAPE: Final = -0.8
+"""Greatest height of the lower end of hair about the eyes, face radii; and its quantile of what is hair in front."""
 
-HAIRLINE = 0.55
-"""Height of the hairline above the eyes relative to the head's half width."""
+NAPE_QUANTILE: Final = 0.03
+
+TOP: Final = 0.9
+"""Height above the eyes from which a head is never bare where it has hair, face radii."""
+
+SKIN_HUE, SKIN_LIGHT = 10.0, 28.0
+"""Tolerances for shades of skin, CIELAB units: of a and b, and of L."""
+
+PROFILE: Final = 0.55
+"""Distance of the eyes from the middle of a head drawn in profile, head radii."""
+
+NARROW: Final = 0.5
+"""Largest distance between the shoulders of a body drawn in profile, lengths of the trunk."""
 
 
-def drawn_face(
-    figure: Figure, frame: ImageFrame, outline: Outline, points: NDArray[np.float64]
-) -> tuple[NDArray[np.bool_], float]:
-    """(h, w) bool: face drawn from the front; and the head's half width, FIGURE units.
+@dataclass(frozen=True)
+class Face:
+    """A face that is not drawn from behind.
 
-    Profiles and faceless heads have none to hide.
+    eyes : FIGURE x, y; up : unit vector; radius : FIGURE units
     """
+
+    eyes: NDArray[np.float64]
+    up: NDArray[np.float64]
+    radius: float
+
+    def at(self, points: NDArray[np.float64]) -> FacePositions:
+        """Positions of (H, W, 2) FIGURE points."""
+        offset = (points - self.eyes) / self.radius
+        return FacePositions(offset @ np.array([self.up[1], -self.up[0]]), offset @ self.up, self.radius)
+
+
+@dataclass(frozen=True)
+class FacePositions:
+    """aside, above : (H, W) position of each pixel about the eyes along the head's own axes, face radii;
+    radius : FIGURE units"""
+
+    aside: NDArray[np.float64]
+    above: NDArray[np.float64]
+    radius: float
+
+
+def find_face(figure: Figure, frame: ImageFrame, canvas: Canvas) -> Face | None:
+    """Face of a figure; None where it has none or is drawn from behind."""
     eyes, head, neck = (frame.figure_from_image(figure.joints_px[JOINT[n]]) for n in ("eyes", "head", "neck"))
-    none = np.zeros(points.shape[:-1], bool)
-    radius = -float(outline.canvas.sample(outline.canvas.sdf, head[None])[0])
+    radius = -float(canvas.sample(canvas.sdf, head[None])[0])
     if not figure.visible[JOINT["eyes"]] or radius <= 0:
-        return none, 0.0
+        return None
+    up = head - neck
+    up = up / max(float(np.linalg.norm(up)), 1e-9)
+    height = abs(float((eyes - neck) @ up))
+    return Face(eyes, up, min(radius, max(height / 2, 0.3 * radius)))
+
+
+def in_profile(figure: Figure, frame: ImageFrame, canvas: Canvas) -> bool:
+    """Whether a figure is drawn from the side: head and body."""
+    joints = frame.figure_from_image(figure.joints_px)
+    eyes, head, neck, pelvis, left, right = (
+        joints[JOINT[n]] for n in ("eyes", "head", "neck", "pelvis", "l_shoulder", "r_shoulder")
+    )
+    radius = -float(canvas.sample(canvas.sdf, head[None])[0])
+    if not figure.visible[JOINT["eyes"]] or radius <= 0:
+        return False
     up = head - neck
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     aside = abs(float(np.array([up[1], -up[0]]) @ (eyes - head)))
-    if aside > 0.6 * radius:
-        return none, 0.0
-    # From the chin to a hairline half a head above the eyes; below the eyes as wide as the head.
-    offset = points - eyes
-    along, across = offset @ up, (points - head) @ np.array([up[1], -up[0]])
-    rise = np.maximum(along, 0.0) / (HAIRLINE * radius)
-    face = (rise**2 + (across / (FACE_SHARE * radius)) ** 2 < 1.0) & (along > -2.0 * radius)
-    return np.asarray(face), radius
+    trunk = float(np.linalg.norm(neck - pelvis))
+    return aside > PROFILE * radius and float(np.linalg.norm(left - right)) < NARROW * trunk
 
 
-def back_of_head(
-    kind: NDArray[np.int_],
+@dataclass(frozen=True)
+class HeadMaterials:
+    """Materials of a head.
+
+    skin : indices of those of the face; hair : index of that of the hair, or of the hat that takes its place
+    nape : height of the lower end of the hair about the eyes, face radii
+    """
+
+    skin: NDArray[np.int_]
+    hair: int
+    nape: float
+
+
+def head_materials(
+    face: FacePositions,
     head: NDArray[np.bool_],
-    face: NDArray[np.bool_],
-    palette: NDArray[np.float32],
     index: NDArray[np.int_],
-    weight: NDArray[np.float64],
-    line: float,
-    radius: float,
-) -> NDArray[np.int_]:
-    """(h, w) areas with the face in the colour of hair or hat beside it, heads in the few colours of their areas.
-
-    Shades of one colour are that colour. A face without hair or hat around it keeps the head's colour.
+    clear: NDArray[np.bool_],
+    colour: NDArray[np.float32],
+    pitch: float,
+) -> HeadMaterials | None:
+    """Skin and hair of a head; None where it is bald or has no face.
 
     Parameters
     ----------
-    kind : (h, w) colour of each pixel's area; head, face : (h, w) bool
-    palette : (K, 3) 0-255; index : (h, w) palette colour of each pixel; weight : (K,) small for colours of strokes
-    line : width of a contour, pixels; radius : search distance for hair beside the face, pixels
+    head : (H, W) bool; index : (H, W) material; clear : (H, W) bool, pixels that are shown and no ink
+    colour : (K, 3) of the materials; pitch : FIGURE units per pixel
     """
-    colours = _area_colours(palette, kind, index, head, weight, line)
-    if not len(colours):
-        return kind
-    known = colours >= 0
-    _, source = ndimage.distance_transform_edt(~(head & known[kind]), return_indices=True)
-    areas = colours[kind[tuple(source)]] if (head & known[kind]).any() else kind
-    face = face & head
-    around = head & ~face & known[kind]
-    if not face.any() or not around.any():
-        return np.where(head, areas, kind)
-    few = np.where(known[kind], colours[kind], 0)
-    skin = int(np.argmax(np.bincount(few[face & known[kind]], minlength=len(palette))))
-    hair = around & (few != skin)
-    if hair.sum() < MIN_HAIR * head.sum():
-        hair = around
-    # Right beside cheeks and temples there is hair; above there may be a hat, below a scarf, further out a rucksack.
-    rows = np.flatnonzero(face.any(axis=1))
-    cheeks = face.copy()
-    cheeks[: int(np.quantile(rows, CHEEKS[0]))] = cheeks[int(np.quantile(rows, CHEEKS[1])) :] = False
-    wide = 2 * int(radius) + 1
-    beside = hair & ndimage.binary_dilation(cheeks, np.ones((1, wide)))
-    over = hair & ndimage.binary_dilation(face, np.ones((wide, wide)))
-    if beside.sum() >= MIN_HAIR / 4 * head.sum():
-        hair = beside
-    elif np.ptp(np.flatnonzero(hair.any(axis=0))) > BRIM * np.ptp(np.flatnonzero(face.any(axis=0))):
-        # A hat with a brim and no hair: a bare neck, not a hood.
-        return np.where(face, skin, np.where(head, areas, kind))
-    elif over.sum() >= MIN_HAIR / 2 * head.sum():
-        hair = over
-    hue = int(np.argmax(np.bincount(few[hair], minlength=len(palette))))
-    return np.where(face, hue, np.where(head, areas, kind))
+    own = head & clear
+    aside, above = np.abs(face.aside), face.above
+    middle = own & (aside < FACE[0]) & (above > FACE[1]) & (above < FACE[2])
+    if not middle.any():
+        return None
+    skin = _shades(int(np.bincount(index[middle]).argmax()), colour)
+    other = own & ~np.isin(index, skin)
+    least = MIN_HAIR * (face.radius / pitch) ** 2
+    beside = other & (aside > BESIDE[0]) & (aside < BESIDE[1]) & (above > BESIDE[2]) & (above < BESIDE[3])
+    counts = np.bincount(index[beside], minlength=len(colour))
+    if counts.max(initial=0) < least:
+        crown = other & (aside < CROWN[0]) & (above > CROWN[1])
+        counts = np.bincount(index[crown], minlength=len(colour))
+        if counts.max(initial=0) < least:
+            return None
+        hat = int(counts.argmax())
+        brim = other & (index == hat) & (above > 0)
+        if aside[brim].max(initial=0) > BRIM and np.ptp(face.aside[brim]) > 2 * BRIM:
+            return None
+    hair = int(counts.argmax())
+    low = np.quantile(above[other & (index == hair)], NAPE_QUANTILE) if (other & (index == hair)).any() else NAPE
+    return HeadMaterials(skin, hair, min(float(low), NAPE))
 
 
-def _area_colours(
-    palette: NDArray[np.float32],
-    kind: NDArray[np.int_],
-    index: NDArray[np.int_],
-    own: NDArray[np.bool_],
-    weight: NDArray[np.float64],
-    line: float,
+def covered_rim(
+    material: NDArray[np.int_], votes: NDArray[np.float64], above: NDArray[np.float64], found: HeadMaterials
 ) -> NDArray[np.int_]:
-    """(K,) index of the colour with areas that each palette colour is merged into, -1 for strokes and mixed rims.
+    """(N,) materials of a head's rim with hair where the drawing has temples, ears and cheeks.
 
-    Empty where no colour has an area.
+    material : (N,); votes : (N, K); above : (N,) height of each point about the eyes, face radii
     """
+    bare = np.isin(material, found.skin) & (above > found.nape)
+    rest = votes.copy()
+    rest[:, found.skin] = 0.0
+    best = np.where(rest.max(axis=1) > 0.15, rest.argmax(axis=1), found.hair)
+    return np.where(bare, np.where(above > TOP, best, found.hair), material)
+
+
+def _shades(material: int, colour: NDArray[np.float32]) -> NDArray[np.int_]:
+    """Materials that are shades of one."""
     from skimage.color import rgb2lab
 
-    lab = rgb2lab(palette / 255.0)
-    count = np.bincount(kind[own], minlength=len(palette))
-    result = np.full(len(palette), -1)
-    for colour in np.argsort(-count, kind="stable"):
-        area = own & (kind == colour)
-        if count[colour] < MIN_HAIR * own.sum() or weight[colour] <= STROKE:
-            continue
-        if ndimage.distance_transform_edt(area).max() <= max(line, 1.0):
-            continue
-        alike = np.flatnonzero(np.linalg.norm(lab - lab[colour], axis=1) < SHADE)
-        if np.isin(index[area], alike).mean() < FILLED:
-            continue
-        larger = np.flatnonzero(result == np.arange(len(palette)))
-        near = np.isin(larger, alike)
-        result[colour] = larger[near][0] if near.any() else colour
-    return result if (result >= 0).any() else result[:0]
+    apart = np.abs(rgb2lab(colour / 255.0) - rgb2lab(colour[material] / 255.0))
+    return np.flatnonzero((np.hypot(apart[:, 1], apart[:, 2]) < SKIN_HUE) & (apart[:, 0] < SKIN_LIGHT))

@@ -87,39 +87,53 @@ def without_contour(
     return np.where(((line | ~own) & near)[..., None], picture[tuple(source)], picture)
 
 
-def reinked(
+def lined_pairs(
     palette: NDArray[np.float32], kind: NDArray[np.int_], own: NDArray[np.bool_], pen: Pen | None
-) -> NDArray[np.float32]:
-    """(h, w, 3) plain areas with lines where they meet, for pairs of colours between which the drawing has lines.
+) -> NDArray[np.bool_]:
+    """(K, K) bool: colours between which the drawing has lines.
 
     palette : (K, 3) 0-255; kind : (h, w) palette colour of each pixel
     own : (h, w) bool, visible pixels of these areas
     """
-    picture = palette[kind]
+    result = np.zeros((len(palette), len(palette)), bool)
     if pen is None:
-        return picture
+        return result
     apart = np.linalg.norm(palette[:, None] - palette, axis=-1) > ALIKE
     wet = np.linalg.norm(palette - pen.colour, axis=-1) <= ALIKE
     may = apart & ~wet[:, None] & ~wet
+    for axis in (0, 1):
+        border, low, high = _border(kind, may, axis)
+        for a, b in np.unique(np.stack([low[border], high[border]], axis=1), axis=0):
+            shown = border & (low == a) & (high == b) & own
+            if shown.sum() >= MIN_BORDER_PX and pen.near[shown].mean() >= DRAWN:
+                result[a, b] = result[b, a] = True
+    return result
+
+
+def reinked(
+    palette: NDArray[np.float32], kind: NDArray[np.int_], lined: NDArray[np.bool_], pen: Pen | None
+) -> NDArray[np.float32]:
+    """(h, w, 3) plain areas with lines where they meet, for pairs of colours between which the drawing has lines.
+
+    palette : (K, 3) 0-255; kind : (h, w) palette colour of each pixel; lined : (K, K) bool, those pairs
+    """
+    picture = palette[kind]
+    if pen is None or not lined.any():
+        return picture
     lines = np.zeros(kind.shape, bool)
     for axis in (0, 1):
-        before, after = (np.take(kind, np.arange(kind.shape[axis])[part], axis) for part in (slice(-1), slice(1, None)))
-        border = np.zeros(kind.shape, bool)
-        np.moveaxis(border, axis, 0)[1:] = np.moveaxis(before != after, axis, 0)
-        other = np.roll(kind, 1, axis)
-        for pair in _pairs(kind, border & may[kind, other], axis):
-            shown = pair & own
-            if shown.sum() >= MIN_BORDER_PX and pen.near[shown].mean() >= DRAWN:
-                lines |= pair
+        lines |= _border(kind, lined, axis)[0]
     if not lines.any():
         return picture
     cover = np.clip(pen.width / 2 + 0.5 - ndimage.distance_transform_edt(~lines), 0.0, 1.0)[..., None]
     return np.asarray(picture + cover * (pen.colour - picture), np.float32)
 
 
-def _pairs(kind: NDArray[np.int_], border: NDArray[np.bool_], axis: int) -> list[NDArray[np.bool_]]:
-    """Pixels of the border by the pair of colours that meet there."""
+def _border(
+    kind: NDArray[np.int_], pairs: NDArray[np.bool_], axis: int
+) -> tuple[NDArray[np.bool_], NDArray[np.int_], NDArray[np.int_]]:
+    """Pixels with a different colour before them along an axis, if it is one of the pairs; and both colours, sorted."""
     before = np.roll(kind, 1, axis)
-    count = int(kind.max()) + 1
-    code = np.minimum(kind, before) * count + np.maximum(kind, before)
-    return [border & (code == pair) for pair in np.unique(code[border])]
+    border = pairs[kind, before] & (kind != before)
+    np.moveaxis(border, axis, 0)[0] = False
+    return border, np.minimum(kind, before), np.maximum(kind, before)

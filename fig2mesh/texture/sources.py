@@ -6,8 +6,7 @@ buttons, eyes. It is a mode filter over a small palette: at every pixel the colo
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +17,10 @@ from scipy.cluster.vq import kmeans2
 from fig2mesh.image_frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import Figure
-from fig2mesh.skeleton import PART
-from fig2mesh.texture.heads import back_of_head, drawn_face
-from fig2mesh.texture.majority import UnobservedPoints, recoloured_by_majority
-from fig2mesh.texture.patterns import patterned
-from fig2mesh.texture.pen import DARK, Pen, find_pen, reinked, without_contour
+from fig2mesh.texture.heads import find_face, in_profile
+from fig2mesh.texture.layer_pictures import Drawing, foreign_pixels, layer_pictures
+from fig2mesh.texture.materials import find_materials
+from fig2mesh.texture.pen import DARK, Pen, find_pen, without_contour
 
 CUT_OUT = 64
 """Threshold of mean alpha beside a figure, below which it counts as cut out of its picture."""
@@ -35,9 +33,6 @@ MIN_ALPHA = 64
 
 COLOURS = 16
 """Palette size; flat drawings have fewer, shaded ones lose little."""
-
-WINDOW = 0.022
-"""Radius of the mode filter, FIGURE units: wider than a contour, narrower than a limb."""
 
 LINE_WIDTH = 0.014
 """Half the largest width of strokes of ink, FIGURE units: colours that only occur in thinner ones are ink."""
@@ -58,8 +53,10 @@ class Sources:
     """Colour pictures in IMAGE pixels of the figure.
 
     seen : (H, W, 3) float32 sRGB 0-255; the drawing, its colours continued beyond the silhouette
-    plain : part label → (h, w, 3) float32, colours of that part on its sides that are not observed
-    plain_scale : IMAGE pixels → pixels of the plain pictures
+    plain : part label → (h, w, 3) float32, colours of that part where something hides it from the viewer
+    back : part label → (h, w, 3) float32, colours of that part where it looks away from the viewer; as `plain` for
+        labels that it lacks
+    plain_scale : IMAGE pixels → pixels of `plain` and `back`
     pen : of the drawing, its width in FIGURE units; None where it has no contours
     grazing : least z of the smooth normal of a point coloured by the drawing. The smooth normal is compared, not the
         triangle's, so that the border between observed and inferred runs evenly across triangles
@@ -70,6 +67,7 @@ class Sources:
     plain_scale: float
     pen: Pen | None = None
     grazing: float = GRAZING
+    back: dict[int, NDArray[np.float32]] = field(default_factory=dict)
 
 
 def make_sources(
@@ -78,12 +76,10 @@ def make_sources(
     outline: Outline,
     texture_size: int,
     seed: int,
-    infer: Callable[[NDArray[np.float32]], UnobservedPoints] | None = None,
     contours: bool = True,
 ) -> Sources:
     """Make the drawing and its plain version for each part of `outline`.
 
-    infer : function that makes the networks' points of the other sides from the picture with its colours continued
     contours : keep the line along the silhouette
     """
     seen = continued(figure.rgba, figure.mask)
@@ -100,41 +96,29 @@ def make_sources(
         at = frame.image_from_figure(outline.canvas.points()[shown])[:, ::-1] / factor
         row, column = np.clip(np.floor(at).astype(int), 0, np.array(labels.shape) - 1).T
         labels[row, column] = outline.split.labels[shown]
-    palette, index = _palette(small, labels > 0, seed)
+    own = labels > 0
+    palette, index = _palette(small, own, seed)
     pitch = frame.units_per_px * factor
-    ink = _ink(palette, index, labels > 0, LINE_WIDTH / pitch)
-    pen = find_pen(palette, index, ink, labels > 0)
-
-    unobserved = None if infer is None else infer(seen)
-    face, radius = drawn_face(figure, frame, outline, points)
+    ink = _ink(palette, index, own, LINE_WIDTH / pitch)
+    pen = find_pen(palette, index, ink, own)
+    materials = find_materials(small, palette, index, own, pen, pitch)
+    canvas = outline.canvas
+    joints = frame.figure_from_image(figure.joints_px)
+    profile = in_profile(figure, frame, canvas)
+    drawing = Drawing(small, own, materials, pen, frame, factor, pitch, joints, profile)
+    foreign = foreign_pixels(drawing, canvas, outline.split)
+    face = find_face(figure, frame, canvas)
     plain: dict[int, NDArray[np.float32]] = {}
-    for surface in outline.layers:
-        parts = [int(part) for part in np.unique(surface.labels[surface.labels > 0])]
-        own = np.isin(labels, parts)
-        if not own.any():
-            own = labels > 0
-        kind = _dominant(index, own, ink, WINDOW / pitch)
-        if PART["head"] in parts:
-            # Networks are worst on heads: half of their errors are there.
-            line, reach = LINE_WIDTH / pitch, 0.5 * radius / pitch
-            areas = back_of_head(kind, labels == PART["head"], face, palette, index, ink, line, reach)
-            plain[PART["head"]] = reinked(palette, areas, own, pen)
-            parts.remove(PART["head"])
-        if parts and unobserved is not None:
-            chosen = np.isin(unobserved.labels, parts)
-            pixels, named = (
-                np.floor(frame.image_from_figure(places[chosen].astype(np.float64))[:, ::-1] / factor).astype(int)
-                for places in (unobserved.points, unobserved.found)
-            )
-            kind = recoloured_by_majority(kind, pixels, named)
-        if parts:
-            drawn = patterned(index, kind, own, WINDOW / pitch)[..., None]
-            plain |= dict.fromkeys(parts, np.where(drawn, small, reinked(palette, kind, own, pen)))
+    back: dict[int, NDArray[np.float32]] = {}
+    for layer in outline.split.layers:
+        pictures = layer_pictures(drawing, canvas, layer, foreign, face)
+        for part in np.unique(layer.labels[layer.labels > 0]).tolist():
+            plain[part], back[part] = pictures.near, pictures.far
     grazing = GRAZING
     if pen is not None and not contours:
         seen, grazing = without_contour(seen, figure.mask, pen, pen.width * factor), GRAZING_BARE
     pen = None if pen is None else replace(pen, width=pen.width * pitch)
-    return Sources(seen, plain, 1.0 / factor, pen, grazing)
+    return Sources(seen, plain, 1.0 / factor, pen, grazing, back)
 
 
 def continued(rgba: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -216,25 +200,3 @@ def _ink(
             else:
                 weight[i] = 0.05**2
     return np.asarray(np.maximum(weight, light))
-
-
-def _dominant(
-    index: NDArray[np.int_],
-    own: NDArray[np.bool_],
-    weight: NDArray[np.float64],
-    radius: float,
-) -> NDArray[np.int_]:
-    """(h, w) mode filter: index of the dominant colour nearby, among the pixels `own`; continued outside."""
-    best = np.zeros(index.shape)
-    chosen = np.zeros(index.shape, int)
-    for i in range(len(weight)):
-        member = (own & (index == i)).astype(np.float32)
-        if member.any():
-            votes = weight[i] * ndimage.gaussian_filter(member, radius / 1.5)
-            better = votes > best
-            best[better], chosen[better] = votes[better], i
-    reliable = own & (best > 1e-4)
-    if not reliable.any():
-        reliable = own
-    _, source = ndimage.distance_transform_edt(~reliable, return_indices=True)
-    return np.asarray(chosen[tuple(source)])
