@@ -10,7 +10,7 @@ Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
 Precision = Literal["float32", "bfloat16"]
-Textures = Literal["network", "plain", "none"]
+Textures = Literal["network", "plain", "paper", "none"]
 Contours = Literal["keep", "drop"]
 
 
@@ -30,7 +30,7 @@ class Settings:
     closing : method that closes the holes left by ball pivoting
     parts : source of depths: networks, or rules and the outline alone
     textures : of sides that the drawing does not show: inferred by networks, or plain colours of what is drawn in
-        front of them; none at all
+        front of them; the paper's, painted by networks in four views and blended by the normal; none at all
     contours : of the silhouette, if drawn: kept on the surface, or left to the client
     light : clients light the surface; without, they show its colours as they are
     normals : whether any output or effect needs shading normals, see `fig2mesh.conversion.plan`

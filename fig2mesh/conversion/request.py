@@ -128,7 +128,8 @@ class InferenceOptions:
     textures: Textures | None = option(
         default=None,
         help="Colours of sides that the drawing does not show: painted by neural networks (default), or plain colours "
-        "taken from the drawing (default with --parts outline). none: no texture at all.",
+        "taken from the drawing (default with --parts outline). paper: four views painted by networks and blended, as "
+        "in the paper, to compare with. none: no texture at all.",
     )
     contours: Contours = option(
         default="keep",

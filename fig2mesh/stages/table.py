@@ -34,6 +34,8 @@ def _simplify(settings: Settings) -> str:
 
 
 def _textures(settings: Settings) -> str:
+    if settings.textures == "paper":
+        return "colours of hidden sides, four views painted by two networks"
     inferred = settings.textures == "network"
     return "colours of hidden sides, " + ("by two networks" if inferred else "those in front of them")
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fig2mesh.field.body import Body
 from fig2mesh.image_frame import image_frame
 from fig2mesh.parts.outline import Outline
-from fig2mesh.records import Figure, FloatArray, Pose3D
+from fig2mesh.records import Figure, Pose3D
 from fig2mesh.settings import Contours, Textures
-from fig2mesh.texture.majority import UnobservedPoints
 from fig2mesh.texture.sources import Sources, make_sources
 
 
@@ -25,4 +26,10 @@ def textures(
     """Pictures from which the bake takes the colours of all texels."""
     frame = image_frame(figure)
 
-    return make_sources(figure, frame, parts, texture_size, seed, contours=contours == "keep")
+    sources = make_sources(figure, frame, parts, texture_size, seed, contours=contours == "keep")
+    if textures != "paper":
+        return sources
+    from fig2mesh.texture.paper import painted_sides
+    from fig2mesh.texture.unobserved import shipped
+
+    return replace(sources, painted=painted_sides(body, lift, sources.seen, frame, shipped()))

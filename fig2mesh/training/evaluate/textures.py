@@ -57,6 +57,16 @@ COLOUR_WEIGHT: Final = 1.0
 UNCHANGED, UNLIKE = 30.0, 40.0
 """Maximum difference of a channel (0-255) between equal colours, and minimum between different ones."""
 
+PAPER_SECTION: Final = """## Conversions in the paper's colours
+
+`--textures paper` colours unseen sides as the paper does, to compare with: coordinates by the U-Net, completion in
+texture space, four views that are blended by the normal; the front is the drawing. Of the paper's stages only the
+first two have shipped weights, of our own training: the U-Net and completion, the latter in place of the paper's
+inpainting. Refinement, cartoonisation and the autoencoder for heads are left out: the first and the last can be
+trained ([training.md](training.md)), and are measured above; the second is not built.
+
+![Six figures from four sides: in the colours of a conversion, and below in the paper's](textures_paper.jpg)"""
+
 TEXTURE: Final = 256
 """Edge of the texture for inpainting, texels."""
 
@@ -175,7 +185,7 @@ def evaluate_textures(data: Path, runs: Path | None, bodies: int, report: Report
         _uv_table(data, runs, bodies),
     ]
     report("Unseen sides")
-    sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs))]
+    sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs)), PAPER_SECTION]
     return "\n\n".join(sections) + "\n"
 
 
