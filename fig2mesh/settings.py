@@ -10,7 +10,7 @@ Mesher = Literal["ball-pivot", "isosurface"]
 Closing = Literal["pymeshlab", "fill"]
 Parts = Literal["network", "outline"]
 Precision = Literal["float32", "bfloat16"]
-Textures = Literal["wrap", "none"]
+Textures = Literal["wrap", "paper", "none"]
 Contours = Literal["hull", "keep", "drop"]
 
 
@@ -29,7 +29,8 @@ class Settings:
     mesher : method that turns the surface into a mesh
     closing : method that closes the holes left by ball pivoting
     parts : source of depths: networks, or rules and the outline alone
-    textures : of sides that the drawing does not show: colours of the rim go round; none: no texture at all
+    textures : of sides that the drawing does not show: colours of the rim go round; the paper's, painted by networks in
+        four views and blended by the normal; none at all
     contours : form of the line along the silhouette, if drawn: an inverted hull, a ribbon ("keep"), or none
     light : clients light the surface; without, they show its colours as they are
     normals : whether any output or effect needs shading normals, see `fig2mesh.conversion.plan`

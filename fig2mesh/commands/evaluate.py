@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import click
+
+from fig2mesh.settings import Contours, Textures
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -116,6 +119,64 @@ def textures(source: Path, runs: Path | None, bodies: int, out: Path | None, ove
 
     _check(() if out is None else (out,), overwrite)
     _write(evaluate_textures(source, runs, bodies, lambda line: click.echo(line, err=True)), out)
+
+
+@evaluate.command()
+@click.option("--pack", type=FILE, required=True, metavar="FILE", help="Pack written by `data pack`.")
+@click.option(
+    "--set",
+    "name",
+    type=click.Choice(["tuning", "test"]),
+    default="test",
+    show_default=True,
+    help="16 figures to try things out on, or 64 others of other people in other clothes.",
+)
+@click.option(
+    "--quality", type=click.Choice(["draft", "standard", "fine"]), default="draft", show_default=True, help=QUALITY
+)
+@click.option("--textures", type=click.Choice(get_args(Textures)), help="Colours of unseen sides, as for a conversion.")
+@click.option("--contours", type=click.Choice(get_args(Contours)), help="Form of the contour, as for a conversion.")
+@click.option("--models", type=FOLDER, metavar="DIR", help="Measure DIR/NAME.glb instead of converting the figures.")
+@click.option("--write", "drawings", type=FOLDER, metavar="DIR", help="Only write the figures, with their true backs.")
+@click.option("--count", type=click.IntRange(1), metavar="N", help="Number of figures, if not all.")
+@click.option("-o", "--output", "out", type=FILE, metavar="FILE", help="Output file. Default: stdout.")
+@click.option("--json", "json_", is_flag=True, help="Write the values of all figures as JSON instead of a summary.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def backs(
+    pack: Path,
+    name: str,
+    quality: str,
+    textures: str | None,
+    contours: str | None,
+    models: Path | None,
+    drawings: Path | None,
+    count: int | None,
+    out: Path | None,
+    json_: bool,
+    overwrite: bool,
+) -> None:
+    """Compare backs of models with the true backs of synthetic figures.
+
+    Beside them stand the mirrored front and the nearest colour that the front shows.
+    """
+    from fig2mesh.errors import InputError
+    from fig2mesh.evaluate.backs import as_json, as_markdown, evaluate_backs, write_figures
+    from fig2mesh.settings import settings_for
+    from fig2mesh.training.bodies.pack import load_pack
+
+    if models is not None and not models.is_dir():
+        raise InputError("--models", f"no such directory {models}", "name the folder of the models, or leave it out")
+    _check(() if out is None else (out,), overwrite)
+    if drawings is not None:
+        write_figures(load_pack(pack), name, drawings, count)
+        return
+    settings = settings_for(quality, textures=textures, contours=contours)  # type: ignore[arg-type]
+    rows, failures = evaluate_backs(
+        load_pack(pack), name, settings, models=models, limit=count, report=lambda line: click.echo(line, err=True)
+    )
+    _write(as_json(rows, failures) if json_ else as_markdown(rows, failures, name, settings), out)
+    if failures:
+        raise SystemExit(1)
 
 
 @evaluate.command()

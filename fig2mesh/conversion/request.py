@@ -127,8 +127,8 @@ class InferenceOptions:
     )
     textures: Textures | None = option(
         default=None,
-        help="Colours of sides that the drawing does not show: those of its rim go round (default). none: no texture "
-        "at all.",
+        help="Colours of sides that the drawing does not show: those of its rim go round (default). paper: four views "
+        "painted by networks and blended, as in the paper, to compare with. none: no texture at all.",
     )
     contours: Contours = option(
         default="keep",

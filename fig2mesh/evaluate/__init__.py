@@ -1,1 +1,1 @@
-"""Evaluation: convert folders of drawings and measure the models."""
+"""Evaluation: convert drawings, or synthetic figures with known backs, and measure the models."""

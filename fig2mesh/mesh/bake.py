@@ -196,6 +196,9 @@ def plain_colours(
     points, normals : (N, 3) FIGURE; labels : (N,) of the part that each lies on
     body : its creases are inked where the drawing has contours; None: no ink
     """
+    if sources.painted is not None:
+        unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+        return sources.painted.colours(points, unit)
     pixels = frame.image_from_figure(points)
     color = np.empty((len(points), 3))
     for label in np.unique(labels):

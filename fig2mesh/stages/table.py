@@ -39,6 +39,12 @@ def _contour(settings: Settings) -> str:
     return f"the drawn contour, {forms[settings.contours]}"
 
 
+def _textures(settings: Settings) -> str:
+    if settings.textures == "paper":
+        return "colours of hidden sides, four views painted by two networks"
+    return "colours of hidden sides, continued from the rim"
+
+
 NO_POINTS: Final = Unless("mesher", "isosurface", "the isosurface needs no points")
 NO_TEXTURE: Final = Unless("textures", "none", "no texture is requested")
 
@@ -52,7 +58,7 @@ STAGES: Final[tuple[Stage, ...]] = (
     Stage(surface, lambda settings: "normals, parts and deviation of the simplified mesh"),
     Stage(contour, _contour, unless=NO_TEXTURE),
     Stage(unwrap, lambda settings: "texture coordinates", unless=NO_TEXTURE),
-    Stage(textures, lambda settings: "colours of hidden sides, continued from the rim", Kept.NEVER, NO_TEXTURE),
+    Stage(textures, _textures, Kept.NEVER, NO_TEXTURE),
     Stage(bake, lambda settings: f"a texture of {settings.texture_size} texels per side", unless=NO_TEXTURE),
     Stage(model, lambda settings: "metres, on the ground", Kept.NEVER),
 )

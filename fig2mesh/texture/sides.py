@@ -56,7 +56,7 @@ def trace_sides(body: Body, pose: Pose3D, size: int = SIZE) -> SideViews:
     for yaw in VIEW_YAW_DEG.values():
         turn = axes(yaw)
         extent = np.abs(turn) @ (bounds[1] - bounds[0])
-        pitch = float(extent[:2].max()) / (FILLED * size)
+        pitch = side_pitch(bounds, yaw, size)
         hits = trace(
             body,
             orthographic(yaw, size=(size, size), height=pitch * size, centre=centre, distance=float(extent[2])),
@@ -73,6 +73,12 @@ def trace_sides(body: Body, pose: Pose3D, size: int = SIZE) -> SideViews:
         pitches.append(pitch)
     middle = (float(centre[0]), float(centre[1]))
     return SideViews(np.stack(labels), np.stack(shown), np.stack(depths), np.stack(points), middle, pitches[0])
+
+
+def side_pitch(bounds: NDArray[np.float64], yaw: float, size: int) -> float:
+    """Edge of a pixel in the picture of a side, FIGURE units; bounds : (2, 3) of the body."""
+    extent = np.abs(axes(yaw)) @ (bounds[1] - bounds[0])
+    return float(extent[:2].max()) / (FILLED * size)
 
 
 def body_labels(labels: NDArray[np.uint8], points: NDArray[np.floating], pose: Pose3D) -> NDArray[np.uint8]:

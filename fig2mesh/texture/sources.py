@@ -20,6 +20,7 @@ from fig2mesh.records import Figure
 from fig2mesh.texture.heads import find_face, in_profile
 from fig2mesh.texture.layer_pictures import Drawing, foreign_pixels, layer_pictures
 from fig2mesh.texture.materials import find_materials
+from fig2mesh.texture.painted import BlendedSides
 from fig2mesh.texture.pen import DARK, Pen, find_pen, without_contour
 
 CUT_OUT = 64
@@ -58,6 +59,7 @@ class Sources:
         labels that it lacks
     plain_scale : IMAGE pixels → pixels of `plain` and `back`
     pen : of the drawing, its width in FIGURE units; None where it has no contours
+    painted : the four sides by the texture networks, whose colours then replace `plain` and `back`; None otherwise
     grazing : least z of the smooth normal of a point coloured by the drawing. The smooth normal is compared, not the
         triangle's, so that the border between observed and inferred runs evenly across triangles
     """
@@ -68,6 +70,7 @@ class Sources:
     pen: Pen | None = None
     grazing: float = GRAZING
     back: dict[int, NDArray[np.float32]] = field(default_factory=dict)
+    painted: BlendedSides | None = None
 
 
 def make_sources(

@@ -13,11 +13,11 @@ from fig2mesh.field.distance import grid_distance
 from fig2mesh.image_frame import image_frame
 from fig2mesh.mesh.isosurface import isosurface
 from fig2mesh.records import Figure, Pose3D
-from fig2mesh.skeleton import BODY_PARTS, JOINT, JOINT_NAMES, anchor_joints
-from fig2mesh.training.bodies.occlusion import AVERTED
+from fig2mesh.skeleton import JOINT
 from fig2mesh.training.bodies.pack import Pack
 from fig2mesh.training.bodies.subject import Subject, draw_subject
 from fig2mesh.training.drawing.scene import scene
+from fig2mesh.training.samples.drawn_figure import drawn_joints
 from fig2mesh.training.samples.sdf import signed_distance
 
 PICTURE = 512
@@ -28,9 +28,6 @@ SAMPLES = 8_000
 
 SIDE_PIXEL = 0.006
 """Pixel of the silhouettes from the side, FIGURE units."""
-
-TRUNK = {"head": (2,), "eyes": (2,), "neck": (1, 2), "thorax": (1,), "pelvis": (1,)}
-"""Joint of the trunk → parts on which it is visible."""
 
 
 @dataclass(frozen=True)
@@ -53,23 +50,12 @@ class GroundTruth:
 def ground_truth(subject: Subject, seed: int = 0) -> GroundTruth:
     """Draw a subject's front, and return it with the geometry; a skirt is not drawn."""
     bare = replace(subject, skirt_vertices=np.zeros((0, 3)), skirt_faces=np.zeros((0, 3), np.int32))
-    _, labels, corner, pitch = scene(bare, 0, PICTURE)
-    columns = (subject.joints[:, 0] - corner[0]) / pitch
-    rows = PICTURE - (subject.joints[:, 1] - corner[1]) / pitch
-    showing = {name: set(TRUNK.get(name, ())) for name in JOINT_NAMES}
-    for part in BODY_PARTS:
-        for joint in anchor_joints(part):
-            showing[JOINT_NAMES[joint]].add(part)
-    seen = [
-        labels[int(np.clip(r, 0, PICTURE - 1)), int(np.clip(c, 0, PICTURE - 1))] in showing[name]
-        for name, r, c in zip(JOINT_NAMES, rows, columns, strict=True)
-    ]
-    face = subject.joints[JOINT["eyes"]] - subject.joints[JOINT["head"]]
-    seen[JOINT["eyes"]] = seen[JOINT["eyes"]] and face[2] >= -AVERTED * float(np.linalg.norm(face))
+    _, labels, _, pitch = scene(bare, 0, PICTURE)
+    joints_px, visible = drawn_joints(bare, PICTURE)
     mask = labels > 0
     rgba = np.zeros((PICTURE, PICTURE, 4), np.uint8)
     rgba[mask] = (200, 190, 170, 255)
-    figure = Figure("synthetic", rgba, mask, np.stack([columns, rows], axis=1), np.array(seen), np.zeros_like(labels))
+    figure = Figure("synthetic", rgba, mask, joints_px, visible, np.zeros_like(labels))
     scale = image_frame(figure).units_per_px / pitch
     solids = {part.part: part.solid(subject.vertices * scale) for part in subject.parts}
     corners = (subject.vertices * scale)[subject.rig.faces]

@@ -1,7 +1,8 @@
 """Textures of held-out bodies: texture coordinates (table 4), and the sides that a drawing hides.
 
 The sides are made from the front picture alone and compared with the drawn sides of the training data.
-Shapes, labels and depths are the true ones, so that textures alone are measured.
+Shapes, labels and depths are the true ones, so that networks alone are measured; for conversions see
+`fig2mesh.evaluate.backs`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from fig2mesh.nets.view_refine import REFINE_WEIGHTS, RefineShape
 from fig2mesh.skeleton import PART
 from fig2mesh.texture.space import spread
 from fig2mesh.texture.unobserved import TextureNets, paint, place_changes, shipped, texture_coordinates
-from fig2mesh.training.evaluate.as_baked import baked_sides
 from fig2mesh.training.evaluate.networks import SPLIT_TITLE, SPLITS, table
 from fig2mesh.training.evaluate.paper import UV_SCORES
 from fig2mesh.training.networks.train_uv import scores
@@ -33,9 +33,9 @@ FloatImage = NDArray[np.float32]
 Report = Callable[[str], None]
 
 # fmt: off
-BAKED, DRAWN, HEADS, REFINED, COORDINATES = (
-    "as conversions bake them", "coordinates, refined, in colours of the drawing", "coordinates, refined, heads",
-    "coordinates, refined", "coordinates",
+DRAWN, HEADS, REFINED, COORDINATES = (
+    "coordinates, refined, in colours of the drawing", "coordinates, refined, heads", "coordinates, refined",
+    "coordinates",
 )
 # fmt: on
 # fmt: off
@@ -43,10 +43,10 @@ STRAIGHT, NEAREST, INPAINTED = (
     "straight through the body", "nearest observed point", "OpenCV inpainting in texture space",
 )
 # fmt: on
-METHODS: Final = (BAKED, DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
+METHODS: Final = (DRAWN, HEADS, REFINED, COORDINATES, STRAIGHT, NEAREST, INPAINTED)
 """Methods that make unseen sides; the last three are baselines."""
 
-PLACED: Final = (BAKED, DRAWN, COORDINATES, STRAIGHT)
+PLACED: Final = (DRAWN, COORDINATES, STRAIGHT)
 """Methods that know the position in the drawing of each colour."""
 
 NEEDS_REFINER: Final = (DRAWN, HEADS, REFINED)
@@ -56,6 +56,16 @@ COLOUR_WEIGHT: Final = 1.0
 
 UNCHANGED, UNLIKE = 30.0, 40.0
 """Maximum difference of a channel (0-255) between equal colours, and minimum between different ones."""
+
+PAPER_SECTION: Final = """## Conversions in the paper's colours
+
+`--textures paper` colours unseen sides as the paper does, to compare with: coordinates by the U-Net, completion in
+texture space, four views that are blended by the normal; the front is the drawing. Of the paper's stages only the
+first two have shipped weights, of our own training: the U-Net and completion, the latter in place of the paper's
+inpainting. Refinement, cartoonisation and the autoencoder for heads are left out: the first and the last can be
+trained ([training.md](training.md)), and are measured above; the second is not built.
+
+![Six figures from four sides: in the colours of a conversion, and below in the paper's](textures_paper.jpg)"""
 
 TEXTURE: Final = 256
 """Edge of the texture for inpainting, texels."""
@@ -89,8 +99,6 @@ def painted(subject: TexturedSubject, method: str, nets: TextureNets) -> tuple[F
     found = straight + place_changes(sides, front, texture_coordinates(sides, nets.uv), nets.fill)
     if method == COORDINATES:
         return _sampled(front, found), found
-    if method == BAKED:
-        return baked_sides(subject), straight
     return _in_drawn_colours(paint(sides, front, replace(nets, head=None)), found, front, seen)
 
 
@@ -177,7 +185,7 @@ def evaluate_textures(data: Path, runs: Path | None, bodies: int, report: Report
         _uv_table(data, runs, bodies),
     ]
     report("Unseen sides")
-    sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs))]
+    sections += ["## Unseen sides", _side_table(data, bodies, _networks(runs)), PAPER_SECTION]
     return "\n\n".join(sections) + "\n"
 
 

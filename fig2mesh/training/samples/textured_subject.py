@@ -84,7 +84,7 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Textu
     line = float(np.argwhere(own).mean(axis=0)[0]) + 0.5 if own.any() else size / 2
     across, down = (joints[:, 0] - middle_x) / pitch, (head[1] - joints[:, 1]) / pitch
     joints_px = np.stack([across + size / 2, down + line], axis=1)
-    face = _face(own, joints, joints_px, pitch)
+    face = face_region(own, joints, joints_px, pitch)
     top = float(joints[:, 1].max())
     pose = Pose3D(np.concatenate([joints[:, :2] - [middle_x, top - half * FILLED], joints[:, 2:]], axis=1))
     sides = SideViews(body_labels(labels, points, pose), labels, depth, points, (0.0, 0.0), pitch)
@@ -92,10 +92,13 @@ def _subject(drawings: Drawings, row: int, joints: NDArray[np.float32]) -> Textu
     return TexturedSubject(sides, front, picture, face, joints_px.astype(np.float32))
 
 
-def _face(
-    own: NDArray[np.bool_], joints: NDArray[np.float32], joints_px: NDArray[np.floating], pitch: float
+def face_region(
+    own: NDArray[np.bool_], joints: NDArray[np.floating], joints_px: NDArray[np.floating], pitch: float
 ) -> NDArray[np.bool_]:
-    """(H, W) bool: region of the head (H, W) in which eyes and mouth are drawn."""
+    """(H, W) bool: region of the head (H, W) in which eyes and mouth are drawn.
+
+    joints : (21, 3) VIEW; joints_px : (21, 2) pixels; pitch : edge of a pixel, units of the joints
+    """
     head, eyes = (joints[JOINT[name]] for name in ("head", "eyes"))
     reach = float(np.linalg.norm(eyes - head))
     if not own.any() or eyes[2] - head[2] <= FACING * reach:
