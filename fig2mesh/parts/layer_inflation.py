@@ -12,8 +12,8 @@ from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.cross_section import CrossSection, measure_cross_section
 from fig2mesh.parts.depth import mid_surface
 from fig2mesh.parts.ends import Ends, clip_distance, flat_ends
-from fig2mesh.parts.head_frame import HeadFrame
-from fig2mesh.parts.heads import RaisedHead, raise_head
+from fig2mesh.parts.heads.frame import HeadFrame
+from fig2mesh.parts.heads.raised import RaisedHead, raise_head
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.loads import load_of
 from fig2mesh.parts.rim import extended, rim_distance

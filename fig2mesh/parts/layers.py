@@ -11,7 +11,7 @@ from scipy import ndimage
 from fig2mesh.parts.bones import Bones, core_bones, out_of_cloth
 from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.depth import place_limb
-from fig2mesh.parts.head_frame import head_frame
+from fig2mesh.parts.heads.frame import head_frame
 from fig2mesh.parts.joining import floating
 from fig2mesh.parts.layer_inflation import LayerInflation, LayerSurface
 from fig2mesh.parts.limbs import Limb

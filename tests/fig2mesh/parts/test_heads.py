@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fig2mesh.parts.head_frame import HeadFrame, head_frame
-from fig2mesh.parts.heads import bounded
+from fig2mesh.parts.heads.frame import HeadFrame, head_frame
+from fig2mesh.parts.heads.raised import bounded
 from fig2mesh.skeleton import JOINT
 from tests.drawn import Assembled, Point, Sketch, assemble
 

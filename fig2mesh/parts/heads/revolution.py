@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.parts.head_frame import HeadFrame
+from fig2mesh.parts.heads.frame import HeadFrame
 from fig2mesh.parts.inflate import inflate
 
 FINER = 2.0

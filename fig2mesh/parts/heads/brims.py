@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.parts.head_frame import HeadFrame
+from fig2mesh.parts.heads.frame import HeadFrame
 
 THICKEST = 1.0
 """Largest thickness of a brim, radii of the head."""

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.parts.brims import Brim, find_brim, raise_brim
 from fig2mesh.parts.canvas import Canvas
-from fig2mesh.parts.head_frame import HeadFrame
-from fig2mesh.parts.lobes import NOOK, Bulk, find_bulk, raise_lobes
-from fig2mesh.parts.revolution import revolve
+from fig2mesh.parts.heads.brims import Brim, find_brim, raise_brim
+from fig2mesh.parts.heads.frame import HeadFrame
+from fig2mesh.parts.heads.lobes import NOOK, Bulk, find_bulk, raise_lobes
+from fig2mesh.parts.heads.revolution import revolve
 from fig2mesh.skeleton import PART
 
 DEEPEST = 1.5

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from fig2mesh.parts.canvas import Canvas, raster_distance
 from fig2mesh.parts.distances import closing
-from fig2mesh.parts.head_frame import HeadFrame
+from fig2mesh.parts.heads.frame import HeadFrame
 from fig2mesh.parts.inflate import inflate
 from fig2mesh.parts.rim import RIM_BLUR
 

@@ -1,0 +1,1 @@
+"""Heads in depth: skulls, hats, hair and what sticks out of them."""
