@@ -79,7 +79,7 @@ def contour_of(figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body
             # A ribbon shows the drawing itself, soft edges and what is beside them included.
             readings = np.where(readings > 0, WIDER * readings + SOFT_PX * frame.units_per_px, readings)
         widths = np.maximum(continued_over(mesh, rim, readings[:, None])[:, 0], 0.0)
-        colors = continued_over(mesh, rim, np.where(drawn[:, None], line.color, np.nan))
+        colors = _of_pens(continued_over(mesh, rim, np.where(drawn[:, None], line.color, np.nan)), line.pens)
         moved = inset(mesh, normals, widths)
         # Thin things are inset by less than the line's width, and the rest of the line stays on the surface.
         taken = rim.at(np.linalg.norm(mesh.vertices - moved, axis=1))
@@ -95,6 +95,11 @@ def contour_of(figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body
         else:
             levels.append(ContourLevel(moved, ribbon(rim, stands, rim.at(colors))))
     return Contour(tuple(levels), width, bare)
+
+
+def _of_pens(colors: Floats, pens: Floats) -> Floats:
+    """(V, 3) nearest of the pens (P, 3) to colours (V, 3)."""
+    return np.asarray(pens[np.linalg.norm(colors[:, None] - pens, axis=-1).argmin(axis=1)])
 
 
 def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats, body: Body) -> Floats:

@@ -55,10 +55,12 @@ def ribbon(rim: Rim, width: Floats, color: Floats) -> ContourMesh | None:
     inner[:, :2] -= (1 + OVERLAP) * np.maximum(width[used], 0.0)[:, None] * rim.outwards[used]
     first, second = local.T
     below = len(used)
+    # Where the line ends it is a triangle.
+    ends = width[used] <= 0
     front = np.concatenate(
         [
-            np.stack([first, second, second + below], axis=1),
-            np.stack([first, second + below, first + below], axis=1),
+            np.stack([first, second, second + below], axis=1)[~ends[second]],
+            np.stack([first, second + below, first + below], axis=1)[~ends[first]],
         ]
     )
     faces = np.concatenate([front, front[:, ::-1]])
