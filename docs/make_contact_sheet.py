@@ -25,7 +25,7 @@ from fig2mesh.measure.model import load_textured
 from fig2mesh.mesh.preview import LIGHT, views_sheet
 
 LONLAT = ("8.5417", "47.3769")
-YAWS, CLAY_YAWS = (0, 35, 90, 180), (35, 90)
+YAWS, CLAY_YAWS = (0, 35, 90, 145, 180, 270), (35, 90)
 ROW_HEIGHT, LABEL_HEIGHT, GAP = 380, 26, 18
 MAX_BLOCK_WIDTH = 1240
 """Wider rows (arms and legs spread) are drawn smaller, so that two still fit on a screen."""
