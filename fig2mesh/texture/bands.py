@@ -50,7 +50,7 @@ MIN_LENGTH: Final = 0.06
 
 
 @dataclass(frozen=True)
-class Run:
+class RimRun:
     """Consecutive points of a contour with one material.
 
     members : indices of points of the rim, in order
@@ -61,7 +61,7 @@ class Run:
     material: int
 
 
-def find_runs(rim: Rim, material: NDArray[np.int_]) -> list[Run]:
+def find_runs(rim: Rim, material: NDArray[np.int_]) -> list[RimRun]:
     """Runs along the closed contours of a rim."""
     result = []
     for number in np.unique(rim.contour):
@@ -69,16 +69,16 @@ def find_runs(rim: Rim, material: NDArray[np.int_]) -> list[Run]:
         own = material[members]
         starts = np.flatnonzero(own != np.roll(own, 1))
         if not len(starts):
-            result.append(Run(members, int(own[0])))
+            result.append(RimRun(members, int(own[0])))
             continue
         turned, turned_own = np.roll(members, -starts[0]), np.roll(own, -starts[0])
         for piece in np.split(np.arange(len(members)), np.flatnonzero(np.diff(turned_own)) + 1):
-            result.append(Run(turned[piece], int(turned_own[piece[0]])))
+            result.append(RimRun(turned[piece], int(turned_own[piece[0]])))
     return result
 
 
 def match_runs(
-    rim: Rim, runs: list[Run], region: NDArray[np.bool_], axis: NDArray[np.float64], pitch: float
+    rim: Rim, runs: list[RimRun], region: NDArray[np.bool_], axis: NDArray[np.float64], pitch: float
 ) -> list[tuple[int, int]]:
     """Pairs of runs that are the two ends of one band; no two bands cross.
 
@@ -120,7 +120,9 @@ def match_runs(
     return pairs
 
 
-def draw_bands(rim: Rim, runs: list[Run], pairs: list[tuple[int, int]], region: NDArray[np.bool_]) -> NDArray[np.int_]:
+def draw_bands(
+    rim: Rim, runs: list[RimRun], pairs: list[tuple[int, int]], region: NDArray[np.bool_]
+) -> NDArray[np.int_]:
     """(H, W) material of the bands between paired runs, -1 elsewhere."""
     from skimage.draw import polygon
 

@@ -47,7 +47,7 @@ NARROW: Final = 0.5
 
 
 @dataclass(frozen=True)
-class Face:
+class DrawnFace:
     """A face that is not drawn from behind.
 
     eyes : FIGURE x, y; up : unit vector; radius : FIGURE units
@@ -73,7 +73,7 @@ class FacePositions:
     radius: float
 
 
-def find_face(figure: Figure, frame: ImageFrame, canvas: Canvas) -> Face | None:
+def find_face(figure: Figure, frame: ImageFrame, canvas: Canvas) -> DrawnFace | None:
     """Face of a figure; None where it has none or is drawn from behind."""
     eyes, head, neck = (frame.figure_from_image(figure.joints_px[JOINT[n]]) for n in ("eyes", "head", "neck"))
     radius = -float(canvas.sample(canvas.sdf, head[None])[0])
@@ -82,7 +82,7 @@ def find_face(figure: Figure, frame: ImageFrame, canvas: Canvas) -> Face | None:
     up = head - neck
     up = up / max(float(np.linalg.norm(up)), 1e-9)
     height = abs(float((eyes - neck) @ up))
-    return Face(eyes, up, min(radius, max(height / 2, 0.3 * radius)))
+    return DrawnFace(eyes, up, min(radius, max(height / 2, 0.3 * radius)))
 
 
 def in_profile(figure: Figure, frame: ImageFrame, canvas: Canvas) -> bool:

@@ -14,12 +14,12 @@ from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.split import Layer, Split
 from fig2mesh.skeleton import PART
 from fig2mesh.texture.axes import bone_axes
-from fig2mesh.texture.heads import Face, head_materials
+from fig2mesh.texture.heads import DrawnFace, head_materials
 from fig2mesh.texture.materials import Materials
 from fig2mesh.texture.patterns import patterned, striped
 from fig2mesh.texture.pen import Pen, lined_pairs, reinked
 from fig2mesh.texture.tints import continued_tints, drawn_tints
-from fig2mesh.texture.window import PITCH, Window, window_around
+from fig2mesh.texture.window import PITCH, LayerWindow, window_around
 from fig2mesh.texture.wrap import (
     PATTERN_WINDOW,
     RimColours,
@@ -42,7 +42,7 @@ ON_BONE: Final = 0.35
 
 
 @dataclass(frozen=True)
-class Drawing:
+class RasterDrawing:
     """Drawing on the raster of the plain pictures.
 
     picture : (h, w, 3) float32 0-255, colours continued beyond the silhouette
@@ -71,11 +71,11 @@ class LayerPictures:
 
 
 def layer_pictures(
-    drawing: Drawing,
+    drawing: RasterDrawing,
     canvas: Canvas,
     layer: Layer,
     foreign: NDArray[np.bool_],
-    face: Face | None,
+    face: DrawnFace | None,
 ) -> LayerPictures:
     """Pictures of one layer.
 
@@ -130,12 +130,12 @@ def _unsure(sheet: Sheet, rim: RimColours) -> bool:
 
 
 def _sheet(
-    drawing: Drawing,
+    drawing: RasterDrawing,
     canvas: Canvas,
     layer: Layer,
     foreign: NDArray[np.bool_],
-    face: Face | None,
-    window: Window,
+    face: DrawnFace | None,
+    window: LayerWindow,
 ) -> Sheet:
     labels = np.asarray(window.of_canvas(layer.labels, canvas))
     region = np.asarray(window.of_canvas(layer.region, canvas), bool)
@@ -158,7 +158,7 @@ def _sheet(
 
 
 def _tints(
-    drawing: Drawing, window: Window, sheet: Sheet, near: NDArray[np.int_], far: NDArray[np.int_]
+    drawing: RasterDrawing, window: LayerWindow, sheet: Sheet, near: NDArray[np.int_], far: NDArray[np.int_]
 ) -> list[NDArray[np.float64] | None]:
     """Tints of the two sides; None where all materials have one colour."""
     flat = drawing.materials.flat
@@ -181,7 +181,7 @@ def _outwards(image: NDArray[np.float64], region: NDArray[np.bool_]) -> NDArray[
     return np.asarray(image[tuple(source)])
 
 
-def _upsampled(window: Window, share: NDArray[np.float64], reach: tuple[slice, slice]) -> NDArray[np.int_]:
+def _upsampled(window: LayerWindow, share: NDArray[np.float64], reach: tuple[slice, slice]) -> NDArray[np.int_]:
     """(h, w) material with the largest share at pixels of the picture."""
     used = np.flatnonzero(share.reshape(-1, share.shape[-1]).max(axis=0) > 1e-6)
     best: NDArray[np.float32] | None = None
@@ -196,7 +196,7 @@ def _upsampled(window: Window, share: NDArray[np.float64], reach: tuple[slice, s
     return result
 
 
-def _shown(window: Window, layer: Layer, canvas: Canvas, reach: tuple[slice, slice]) -> NDArray[np.bool_]:
+def _shown(window: LayerWindow, layer: Layer, canvas: Canvas, reach: tuple[slice, slice]) -> NDArray[np.bool_]:
     shown = np.asarray(window.of_canvas(layer.shown, canvas), bool)
     return np.asarray(window.to_picture(shown.astype(np.float64), reach) > 0.5)
 
@@ -214,7 +214,7 @@ def _whole(picture: NDArray[np.float32], reach: tuple[slice, slice], shape: tupl
     return np.asarray(picture[np.ix_(row, column)], np.float32)
 
 
-def foreign_pixels(drawing: Drawing, canvas: Canvas, divided: Split) -> NDArray[np.bool_]:
+def foreign_pixels(drawing: RasterDrawing, canvas: Canvas, divided: Split) -> NDArray[np.bool_]:
     """(h, w) bool: pixels that the split attributes to a layer although they are slivers of another's areas."""
     from fig2mesh.texture.owners import slivers
 

@@ -18,7 +18,7 @@ from fig2mesh.image_frame import ImageFrame
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import Figure
 from fig2mesh.texture.heads import find_face, in_profile
-from fig2mesh.texture.layer_pictures import Drawing, foreign_pixels, layer_pictures
+from fig2mesh.texture.layer_pictures import RasterDrawing, foreign_pixels, layer_pictures
 from fig2mesh.texture.materials import find_materials
 from fig2mesh.texture.painted import BlendedSides
 from fig2mesh.texture.pen import DARK, Pen, find_pen, without_contour
@@ -108,7 +108,7 @@ def make_sources(
     canvas = outline.canvas
     joints = frame.figure_from_image(figure.joints_px)
     profile = in_profile(figure, frame, canvas)
-    drawing = Drawing(small, own, materials, pen, frame, factor, pitch, joints, profile)
+    drawing = RasterDrawing(small, own, materials, pen, frame, factor, pitch, joints, profile)
     foreign = foreign_pixels(drawing, canvas, outline.split)
     face = find_face(figure, frame, canvas)
     plain: dict[int, NDArray[np.float32]] = {}

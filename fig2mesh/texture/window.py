@@ -19,7 +19,7 @@ MARGIN: Final = 8
 
 
 @dataclass(frozen=True)
-class Window:
+class LayerWindow:
     """Raster of square pixels of `PITCH`.
 
     corner : FIGURE x, y of the centre of its first pixel; shape : rows and columns
@@ -72,7 +72,7 @@ class Window:
         return np.asarray(rows[:, lower] * (1 - share) + rows[:, upper] * share, np.float32)
 
 
-def window_around(region: NDArray[np.bool_], canvas: Canvas, frame: ImageFrame, factor: int) -> Window:
+def window_around(region: NDArray[np.bool_], canvas: Canvas, frame: ImageFrame, factor: int) -> LayerWindow:
     """Window around a region of the canvas.
 
     factor : IMAGE pixels per pixel of the picture
@@ -84,7 +84,7 @@ def window_around(region: NDArray[np.bool_], canvas: Canvas, frame: ImageFrame, 
     y = canvas.corner[1] - canvas.pitch * float(rows[0]) + PITCH * MARGIN
     step = PITCH / (frame.units_per_px * factor)
     start = frame.image_from_figure(np.array([x, y])) / factor - 0.5
-    return Window((x, y), (height, width), start[1] + step * np.arange(height), start[0] + step * np.arange(width))
+    return LayerWindow((x, y), (height, width), start[1] + step * np.arange(height), start[0] + step * np.arange(width))
 
 
 def _nearest(

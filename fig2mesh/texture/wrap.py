@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.texture.bands import Run, draw_bands, drawn_bands, find_runs, match_runs
+from fig2mesh.texture.bands import RimRun, draw_bands, drawn_bands, find_runs, match_runs
 from fig2mesh.texture.diffusion import diffused
 from fig2mesh.texture.heads import BESIDE, FACE, FacePositions, HeadMaterials, covered_rim
 from fig2mesh.texture.patterns import striped
@@ -143,7 +143,7 @@ def rim_colours(sheet: Sheet, front: NDArray[np.int_]) -> RimColours:
     return RimColours(rim, material, share)
 
 
-def without_short_runs(colours: RimColours, paired: set[int], runs: list[Run], pitch: float) -> NDArray[np.int_]:
+def without_short_runs(colours: RimColours, paired: set[int], runs: list[RimRun], pitch: float) -> NDArray[np.int_]:
     """(N,) materials with short runs unknown that are not ends of bands."""
     result = colours.material.copy()
     for number, run in enumerate(runs):
@@ -196,7 +196,7 @@ def covered(sheet: Sheet, share: NDArray[np.float64]) -> NDArray[np.float64]:
     return result
 
 
-def _without_earrings(sheet: Sheet, rim: Rim, run: Run) -> Run:
+def _without_earrings(sheet: Sheet, rim: Rim, run: RimRun) -> RimRun:
     """Give a short run beside a face, an earring or an ear, the colour of the hair."""
     assert sheet.face is not None
     assert sheet.skin is not None
@@ -206,7 +206,7 @@ def _without_earrings(sheet: Sheet, rim: Rim, run: Run) -> Run:
     above = sheet.face.above[place]
     if sheet.head[place].mean() < 0.5 or above.max() > BESIDE[3] or above.min() < sheet.skin.nape:
         return run
-    return Run(run.members, sheet.skin.hair)
+    return RimRun(run.members, sheet.skin.hair)
 
 
 def _middle_of_face(sheet: Sheet) -> NDArray[np.bool_]:

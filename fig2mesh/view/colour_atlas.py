@@ -71,9 +71,10 @@ def colour_atlas(sources: Sources, frame: ImageFrame, body: Body) -> ColourAtlas
     crops = [_crop(_bytes(sources.seen), 1.0, frame, body.bounds())]
     boxes, labels = body.grids.boxes, body.labels[body.grids.owners]
     slot_of_label: dict[int, int] = {}
-    # Parts of one layer share a picture.
-    for picture in {id(picture): picture for picture in sources.plain.values()}.values():
-        own = [label for label, other in sources.plain.items() if other is picture]
+    # Parts of one layer share a picture. Most of what the drawing does not show looks away from the viewer.
+    unseen = sources.plain | sources.back
+    for picture in {id(picture): picture for picture in unseen.values()}.values():
+        own = [label for label, other in unseen.items() if other is picture]
         mine = boxes[np.isin(labels, own).any(axis=1) & np.isfinite(boxes).all(axis=(1, 2))]
         if len(mine):
             slot_of_label |= dict.fromkeys(own, len(crops))

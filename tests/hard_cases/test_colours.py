@@ -10,8 +10,9 @@ from scipy import ndimage
 
 from exporters.gltf.reader import read_gltf
 from exporters.validate import validate
-from fig2mesh.texture.pen import find_pen, reinked, without_contour
-from fig2mesh.texture.sources import _dominant, _ink, _palette, continued
+from fig2mesh.texture.materials import find_materials
+from fig2mesh.texture.pen import find_pen, lined_pairs, reinked, without_contour
+from fig2mesh.texture.sources import _ink, _palette, continued
 from tests.drawn import draw_figure
 from tests.hard_cases.case import Worst, drawn, hard_case
 from tests.hard_cases.figures import Job, drawn_mask, painted
@@ -119,9 +120,10 @@ def test_palettes_and_pens_of_tiny_pictures(worst: Worst, drawn_picture: tuple[n
     worst(max(float((picture[own].min(axis=0) - used).max()), float((used - picture[own].max(axis=0)).max()), 0.0))
     ink = _ink(palette, index, own, 1.5)
     assert ((ink >= 0) & (ink <= 1)).all()
-    kind = _dominant(index, own, ink, 3.0)
     pen = find_pen(palette, index, ink, own)
-    assert np.isfinite(reinked(palette, kind, own, pen)).all()
+    kind = find_materials(picture, palette, index, own, pen, 0.01).index
+    assert set(np.unique(kind)) <= set(range(len(palette)))
+    assert np.isfinite(reinked(palette, kind, lined_pairs(palette, kind, own, pen), pen)).all()
     if pen is not None:
         assert np.isfinite(pen.width)
         assert pen.width >= 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.texture.heads import Face, FacePositions, HeadMaterials, covered_rim, head_materials
+from fig2mesh.texture.heads import DrawnFace, FacePositions, HeadMaterials, covered_rim, head_materials
 
 SKIN, HAIR, HAT, INK = range(4)
 COLOUR = np.array([(240, 200, 170), (120, 70, 30), (30, 30, 160), (10, 10, 10)], np.float32)
@@ -20,7 +20,7 @@ def drawn() -> tuple[NDArray[np.int_], NDArray[np.bool_], FacePositions]:
     index = np.where(y < -22, HAT, HAIR)
     index = np.where(face, SKIN, index)
     points = np.stack([x, -y], axis=-1) * PITCH
-    return index, head, Face(np.zeros(2), np.array([0.0, 1.0]), RADIUS).at(points)
+    return index, head, DrawnFace(np.zeros(2), np.array([0.0, 1.0]), RADIUS).at(points)
 
 
 def found(index: NDArray[np.int_]) -> HeadMaterials | None:
