@@ -18,6 +18,12 @@ from fig2mesh.image_frame import ImageFrame
 
 Floats = NDArray[np.float64]
 
+LUMINANCE: Final = np.array([0.2126, 0.7152, 0.0722])
+"""Weights of red, green and blue in luminance."""
+
+MIN_WHITE: Final = 205.0
+"""Least luminance, 0-255, of light ink; less is light at the rim."""
+
 MAX_WIDTH: Final = 0.06
 """Largest width of a line, FIGURE units: that of a felt-tip pen on a child's drawing."""
 
@@ -121,6 +127,8 @@ def drawn_line(
     # White ink on dark fills: the same in the negative. Cut-out figures have a light fringe of a pixel.
     light = _dark_line(255 - picture, frame, points[:, :2], outwards, shown, MIN_LIGHT_PX * frame.units_per_px)
     pens = 255 - light.pens
+    if (pens @ LUMINANCE < MIN_WHITE).any():
+        return line
     if paper is not None and len(pens) and (np.linalg.norm(pens - paper, axis=1) < ALIKE).any():
         return line
     return DrawnLine(light.width, 255 - light.color, pens)
@@ -173,7 +181,7 @@ def _read(picture: NDArray[np.float32], frame: ImageFrame, points: Floats, outwa
         [ndimage.map_coordinates(picture[..., c], at, order=1, mode="nearest") for c in range(3)], axis=-1
     ).astype(np.float64)
     rows = np.arange(len(points))
-    luminance = colours @ np.array([0.2126, 0.7152, 0.0722])
+    luminance = colours @ LUMINANCE
     # The first valley is the line, whatever is darker further in.
     passed = np.maximum.accumulate(luminance - np.minimum.accumulate(luminance, axis=1), axis=1) > VALLEY
     core = np.where(passed, np.inf, luminance).argmin(axis=1)
@@ -214,7 +222,7 @@ def _mixed(profiles: _Profiles, pen: Floats) -> NDArray[np.bool_]:
 def _pens(profiles: _Profiles, shown: NDArray[np.bool_], px: float) -> Floats:
     """(P, 4) colour and usual width of the pens, the most used one first."""
     width, rise = profiles.width, profiles.rise
-    luminance = profiles.ink @ np.array([0.2126, 0.7152, 0.0722]) / 255.0
+    luminance = profiles.ink @ LUMINANCE / 255.0
     left = shown & np.isfinite(width) & (width <= MAX_WIDTH) & (rise >= DARKER) & (luminance < MAX_LUMINANCE)
     least = MIN_SHARE * max(int(shown.sum()), 1)
     pens = []

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from fig2mesh.texture.rim import Rim
+from fig2mesh.texture.rim import LayerRim
 
 MAX_BAND: Final = 0.16
 """Largest width of a band, FIGURE units."""
@@ -61,7 +61,7 @@ class RimRun:
     material: int
 
 
-def find_runs(rim: Rim, material: NDArray[np.int_]) -> list[RimRun]:
+def find_runs(rim: LayerRim, material: NDArray[np.int_]) -> list[RimRun]:
     """Runs along the closed contours of a rim."""
     result = []
     for number in np.unique(rim.contour):
@@ -78,7 +78,7 @@ def find_runs(rim: Rim, material: NDArray[np.int_]) -> list[RimRun]:
 
 
 def match_runs(
-    rim: Rim, runs: list[RimRun], region: NDArray[np.bool_], axis: NDArray[np.float64], pitch: float
+    rim: LayerRim, runs: list[RimRun], region: NDArray[np.bool_], axis: NDArray[np.float64], pitch: float
 ) -> list[tuple[int, int]]:
     """Pairs of runs that are the two ends of one band; no two bands cross.
 
@@ -121,7 +121,7 @@ def match_runs(
 
 
 def draw_bands(
-    rim: Rim, runs: list[RimRun], pairs: list[tuple[int, int]], region: NDArray[np.bool_]
+    rim: LayerRim, runs: list[RimRun], pairs: list[tuple[int, int]], region: NDArray[np.bool_]
 ) -> NDArray[np.int_]:
     """(H, W) material of the bands between paired runs, -1 elsewhere."""
     from skimage.draw import polygon

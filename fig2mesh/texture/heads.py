@@ -86,13 +86,13 @@ def find_face(figure: Figure, frame: ImageFrame, canvas: Canvas) -> DrawnFace | 
 
 
 def in_profile(figure: Figure, frame: ImageFrame, canvas: Canvas) -> bool:
-    """Whether a figure is drawn from the side: head and body."""
+    """Whether a figure is drawn from the side: head and body. Flat drawings may have no eyes, but a place for them."""
     joints = frame.figure_from_image(figure.joints_px)
     eyes, head, neck, pelvis, left, right = (
         joints[JOINT[n]] for n in ("eyes", "head", "neck", "pelvis", "l_shoulder", "r_shoulder")
     )
     radius = -float(canvas.sample(canvas.sdf, head[None])[0])
-    if not figure.visible[JOINT["eyes"]] or radius <= 0:
+    if radius <= 0:
         return False
     up = head - neck
     up = up / max(float(np.linalg.norm(up)), 1e-9)

@@ -81,7 +81,9 @@ def layer_pictures(
 
     foreign : (h, w) bool, pixels of the drawing that are not the layer's although the split has them there
     """
-    region = layer.region if layer.region.any() else layer.shown
+    # A figure of one pixel may lie between those of the canvas.
+    everywhere = np.ones_like(layer.region)
+    region = next(each for each in (layer.region, layer.shown, canvas.inside, everywhere) if each.any())
     window = window_around(region, canvas, drawing.frame, drawing.factor)
     sheet = _sheet(drawing, canvas, layer, foreign, face, window)
     front_share = front_materials(sheet)

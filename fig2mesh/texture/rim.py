@@ -1,4 +1,4 @@
-"""Rim of a layer: its contour in order, and the material inside of the drawn line at each point of it."""
+"""LayerRim of a layer: its contour in order, and the material inside of the drawn line at each point of it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MIN_POINTS: Final = 8
 
 
 @dataclass(frozen=True)
-class Rim:
+class LayerRim:
     """Points along the contours of a region.
 
     points : (N, 2) row and column, pixels of the raster; inwards : (N, 2) unit vectors
@@ -53,7 +53,7 @@ class Rim:
         return result
 
 
-def find_rim(region: NDArray[np.bool_]) -> Rim:
+def find_rim(region: NDArray[np.bool_]) -> LayerRim:
     """Contours of a region, a point about every pixel."""
     from skimage.measure import find_contours
 
@@ -72,16 +72,16 @@ def find_rim(region: NDArray[np.bool_]) -> Rim:
     if not points:
         rows, columns = np.nonzero(region)
         middle = np.stack([rows, columns], axis=1).astype(np.float64)
-        return Rim(middle, np.zeros_like(middle), np.zeros(len(middle), int))
+        return LayerRim(middle, np.zeros_like(middle), np.zeros(len(middle), int))
     places = np.concatenate(points)
     inwards = np.stack(
         [ndimage.map_coordinates(slope[..., axis], places.T, order=1, mode="nearest") for axis in (0, 1)], axis=1
     )
     inwards /= np.maximum(np.linalg.norm(inwards, axis=1, keepdims=True), 1e-9)
-    return Rim(places - 2, inwards, np.concatenate(contour))
+    return LayerRim(places - 2, inwards, np.concatenate(contour))
 
 
-def samples(rim: Rim, depth: float) -> NDArray[np.float64]:
+def samples(rim: LayerRim, depth: float) -> NDArray[np.float64]:
     """(N, S, 2) row and column of samples from each point inwards to a depth in pixels."""
     steps = STEP * np.arange(int(depth / STEP) + 2)
     return np.asarray(rim.points[:, None] + steps[:, None] * rim.inwards[:, None])
@@ -104,7 +104,7 @@ def count_votes(found: NDArray[np.int_], valid: NDArray[np.bool_], number: int, 
 
 
 def decided(
-    rim: Rim, near: NDArray[np.float64], votes: NDArray[np.float64], pitch: float
+    rim: LayerRim, near: NDArray[np.float64], votes: NDArray[np.float64], pitch: float
 ) -> tuple[NDArray[np.int_], NDArray[np.float64]]:
     """Material of each point, -1 where there is none near; and the share of the votes for it.
 

@@ -19,7 +19,7 @@ from fig2mesh.texture.bands import RimRun, draw_bands, drawn_bands, find_runs, m
 from fig2mesh.texture.diffusion import diffused
 from fig2mesh.texture.heads import BESIDE, FACE, FacePositions, HeadMaterials, covered_rim
 from fig2mesh.texture.patterns import striped
-from fig2mesh.texture.rim import NEAR, REACH, SMOOTH, STEP, Rim, count_votes, decided, find_rim, samples
+from fig2mesh.texture.rim import NEAR, REACH, SMOOTH, STEP, LayerRim, count_votes, decided, find_rim, samples
 
 ANISOTROPY: Final = 5.0
 """Ratio of distances along and across a bone at which colours have the same weight."""
@@ -81,7 +81,7 @@ class RimColours:
     rim : its points; material : (N,) of each, -1 for unknown; share : (N,) of the votes for it
     """
 
-    rim: Rim
+    rim: LayerRim
     material: NDArray[np.int_]
     share: NDArray[np.float64]
 
@@ -196,7 +196,7 @@ def covered(sheet: Sheet, share: NDArray[np.float64]) -> NDArray[np.float64]:
     return result
 
 
-def _without_earrings(sheet: Sheet, rim: Rim, run: RimRun) -> RimRun:
+def _without_earrings(sheet: Sheet, rim: LayerRim, run: RimRun) -> RimRun:
     """Give a short run beside a face, an earring or an ear, the colour of the hair."""
     assert sheet.face is not None
     assert sheet.skin is not None
@@ -216,7 +216,7 @@ def _middle_of_face(sheet: Sheet) -> NDArray[np.bool_]:
     return sheet.head & (aside < FACE[0]) & (above > FACE[1]) & (above < FACE[2])
 
 
-def _at_rim(region: NDArray[np.bool_], rim: Rim, material: NDArray[np.int_]) -> NDArray[np.int_]:
+def _at_rim(region: NDArray[np.bool_], rim: LayerRim, material: NDArray[np.int_]) -> NDArray[np.int_]:
     """(H, W) material of the pixels at the rim, -1 elsewhere and where it is unknown."""
     border = region & ~ndimage.binary_erosion(region, border_value=0)
     nearest = np.full(region.shape, -1)
@@ -229,7 +229,7 @@ def _at_rim(region: NDArray[np.bool_], rim: Rim, material: NDArray[np.int_]) -> 
 
 
 def _beyond_extent(
-    sheet: Sheet, rim: Rim, fixed: NDArray[np.int_], back: NDArray[np.int_], front: NDArray[np.int_]
+    sheet: Sheet, rim: LayerRim, fixed: NDArray[np.int_], back: NDArray[np.int_], front: NDArray[np.int_]
 ) -> NDArray[np.bool_]:
     """(H, W) bool: pixels of areas that reach the rim on one side only and extend further than they do in front."""
     place = tuple(np.clip(np.round(rim.points).astype(int), 0, np.array(back.shape) - 1).T)

@@ -29,7 +29,7 @@ KNOBS: Final[Mapping[str, tuple[Any, ...]]] = {
     "closing": ("fill",),
     "triangles": (2_000, 6_000, 60_000),
     "texture_size": (512, 2048),
-    "textures": ("wrap", "none"),
+    "textures": ("paper", "none"),
 }
 """Knob → values other than the standard preset's; the other knobs stay as in that preset. "quality" changes all."""
 

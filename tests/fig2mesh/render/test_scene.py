@@ -50,7 +50,7 @@ def test_fields_are_met_where_single_rays_meet_them(scene: FieldScene, nearby: b
     # Labels differ nowhere but where two parts share the surface, so that the march's tolerance decides between them.
     labels = scene.body.labels[hits.part_index[both]]
     wrong = np.flatnonzero(surface.labels[met] != labels)
-    assert len(wrong) < 0.01 * len(labels)
+    assert len(wrong) < 0.012 * len(labels)
     for found in (surface.labels[met], labels):
         for label in np.unique(found[wrong]):
             own = Body(tuple(part for part in scene.body.parts if part.part == label))
