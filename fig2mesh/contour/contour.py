@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.contour.bare import without_line
 from fig2mesh.contour.contour_mesh import ContourMesh, hull, ribbon
-from fig2mesh.contour.drawn_line import drawn_line, paper_beside
 from fig2mesh.contour.inset import continued_over, inset, steady
 from fig2mesh.contour.rim import Rim, rim_of
 from fig2mesh.field.body import Body
@@ -18,6 +16,8 @@ from fig2mesh.mesh.bake import visible_points
 from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh
 from fig2mesh.settings import Contours
+from fig2mesh.texture.bare import without_line
+from fig2mesh.texture.drawn_line import drawn_line, paper_beside
 from fig2mesh.texture.sources import continued
 
 Floats = NDArray[np.float64]

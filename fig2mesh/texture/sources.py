@@ -15,8 +15,11 @@ from scipy import ndimage
 from scipy.cluster.vq import kmeans2
 
 from fig2mesh.image_frame import ImageFrame
+from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import Figure
+from fig2mesh.texture.bare import without_line
+from fig2mesh.texture.drawn_line import drawn_line, paper_beside
 from fig2mesh.texture.heads import find_face, in_profile
 from fig2mesh.texture.layer_pictures import RasterDrawing, foreign_pixels, layer_pictures
 from fig2mesh.texture.materials import find_materials
@@ -40,6 +43,9 @@ LINE_WIDTH = 0.014
 
 PLAIN_SHARE = 0.625
 """Longest side of the plain pictures relative to the texture's: the texture shows no more of them."""
+
+WIDER, SOFT_PX = 1.1, 0.75
+"""Width of what is taken off relative to the line's, and what is added for its soft edge, pixels."""
 
 GRAZING = 0.0
 """Threshold of the normal's z: a contour at the rim is drawn out along the side. At -0.1 fronts come nearer to the
@@ -104,8 +110,13 @@ def make_sources(
     pitch = frame.units_per_px * factor
     ink = _ink(palette, index, own, LINE_WIDTH / pitch)
     pen = find_pen(palette, index, ink, own)
-    materials = find_materials(small, palette, index, own, pen, pitch)
     canvas = outline.canvas
+    # The line along the silhouette is no material: what it surrounds goes round.
+    bare = without_silhouette_line(seen, figure, frame, canvas)
+    if bare is not None:
+        small = np.asarray(Image.fromarray(bare).reduce(factor), dtype=np.float32)
+        index = _nearest(palette, small)
+    materials = find_materials(small, palette, index, own, pen, pitch)
     joints = frame.figure_from_image(figure.joints_px)
     profile = in_profile(figure, frame, canvas)
     drawing = RasterDrawing(small, own, materials, pen, frame, factor, pitch, joints, profile)
@@ -162,6 +173,33 @@ def _lookup(image: NDArray[np.uint8], where: NDArray[np.int_]) -> NDArray[np.uin
     return np.where(valid, image[np.clip(rows, 0, image.shape[0] - 1), np.clip(columns, 0, image.shape[1] - 1)], 0)
 
 
+def without_silhouette_line(
+    picture: NDArray[np.float32], figure: Figure, frame: ImageFrame, canvas: Canvas
+) -> NDArray[np.uint8] | None:
+    """(H, W, 3) sRGB, a figure's picture without the line along its silhouette; None where it has none.
+
+    picture : (H, W, 3) 0-255, its colours continued beyond the silhouette
+    """
+    down, right = np.gradient(canvas.sdf, canvas.pitch)
+    slope = np.stack([right, -down], axis=-1)
+    rim = canvas.inside & (canvas.sdf > -canvas.pitch) & (np.linalg.norm(slope, axis=-1) > 0.5)
+    if not rim.any():
+        return None
+    outwards = slope[rim] / np.linalg.norm(slope[rim], axis=-1, keepdims=True)
+    points = canvas.points()[rim] - canvas.sdf[rim][:, None] * outwards
+    paper = paper_beside(figure.rgba, figure.mask)
+    line = drawn_line(picture, frame, points, outwards, np.ones(len(points), bool), paper)
+    if not len(line.pens):
+        return None
+    width = np.nan_to_num(WIDER * line.width + np.where(line.width > 0, SOFT_PX * frame.units_per_px, 0.0))
+    return without_line(picture, figure.mask, frame, points, width, line.color, margin_px=2)
+
+
+def _nearest(palette: NDArray[np.float32], picture: NDArray[np.float32]) -> NDArray[np.int_]:
+    """(h, w) index of the palette's colour nearest to each pixel."""
+    return np.asarray(np.argmin(((picture[..., None, :] - palette) ** 2).sum(axis=-1), axis=-1))
+
+
 def _palette(
     picture: NDArray[np.float32], own: NDArray[np.bool_], seed: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int_]]:
@@ -173,8 +211,7 @@ def _palette(
     count = min(COLOURS, len(distinct))
     centres, _ = kmeans2(sample, count, minit="++", seed=random, iter=12)
     centres = centres[np.isfinite(centres).all(axis=1)].astype(np.float32)
-    distance = ((picture[..., None, :] - centres) ** 2).sum(axis=-1)
-    index = np.argmin(distance, axis=-1)
+    index = _nearest(centres, picture)
     # The mean of a cluster is a mixed colour; the median is one that the drawing has.
     for i in range(len(centres)):
         members = picture[own & (index == i)]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fig2mesh.contour.bare import without_line
-from fig2mesh.contour.drawn_line import DrawnLine, drawn_line, paper_beside
 from fig2mesh.image_frame import ImageFrame
+from fig2mesh.texture.bare import without_line
+from fig2mesh.texture.drawn_line import DrawnLine, drawn_line, paper_beside
 
 SIDE, RADIUS_PX = 300, 120
 FRAME = ImageFrame((SIDE / 2, SIDE / 2), 0.004)

@@ -29,6 +29,7 @@ def without_line(
     points: NDArray[np.float64],
     width: NDArray[np.float64],
     color: NDArray[np.float64],
+    margin_px: int = 0,
 ) -> NDArray[np.uint8]:
     """(H, W, 3) sRGB, a picture in which the line along the rim has the colours beside it.
 
@@ -37,6 +38,7 @@ def without_line(
     picture : (H, W, 3) sRGB 0-255, its colours continued beyond the silhouette; mask : (H, W) bool, the silhouette
     points : (N, 2 or 3) of the rim, FIGURE
     width, color : (N,) FIGURE units and (N, 3) sRGB 0-255 of the line that is taken off; 0 where it stays
+    margin_px : width of the soft edge that is taken off with it, pixels
     """
     drawn = width > 0
     if not drawn.any():
@@ -56,9 +58,11 @@ def without_line(
     dark = np.linalg.norm(picture[rows, columns] - color[drawn][index], axis=1) < INKY
     chosen = dark & (distance <= local + SOFT_PX)
     inked[rows[chosen], columns[chosen]] = True
+    if margin_px:
+        inked = ndimage.binary_dilation(inked, iterations=margin_px) & mask
     away, source = ndimage.distance_transform_edt(inked | ~mask, return_indices=True)
-    limit = np.zeros(mask.shape)
-    limit[rows, columns] = MAX_FILL * local + SOFT_PX
+    limit = np.full(mask.shape, SOFT_PX + margin_px)
+    limit[rows, columns] = MAX_FILL * local + SOFT_PX + margin_px
     replaced = (inked & (away <= limit)) | (~mask & (away <= reach))
     result = np.where(replaced[..., None], picture[tuple(source)], picture)
     return np.asarray(np.clip(np.round(result), 0, 255), np.uint8)
