@@ -80,7 +80,7 @@ def contour_of(figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body
             readings = np.where(readings > 0, WIDER * readings + SOFT_PX * frame.units_per_px, readings)
         widths = np.maximum(continued_over(mesh, rim, readings[:, None])[:, 0], 0.0)
         colors = _of_pens(continued_over(mesh, rim, np.where(drawn[:, None], line.color, np.nan)), line.pens)
-        moved = inset(mesh, normals, widths)
+        moved = on_the_ground(mesh, inset(mesh, normals, widths), float(np.median(line.width[drawn])))
         # Thin things are inset by less than the line's width, and the rest of the line stays on the surface.
         taken = rim.at(np.linalg.norm(mesh.vertices - moved, axis=1))
         stands = _standing(mesh, rim, line.width, taken, body)
@@ -95,6 +95,18 @@ def contour_of(figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body
         else:
             levels.append(ContourLevel(moved, ribbon(rim, stands, rim.at(colors))))
     return Contour(tuple(levels), width, bare)
+
+
+def on_the_ground(mesh: Mesh, moved: FloatArray, width: float) -> FloatArray:
+    """(V, 3) inset vertices, of which the lowest keep their height: soles stand where they stood.
+
+    moved : (V, 3) inset vertices; width : height above the lowest vertex over which they come to be inset, FIGURE units
+    """
+    before = mesh.vertices[:, 1]
+    share = np.clip(1 - (before - before.min()) / max(width, 1e-9), 0.0, 1.0)
+    result = moved.copy()
+    result[:, 1] += share * (before - moved[:, 1])
+    return result
 
 
 def _of_pens(colors: Floats, pens: Floats) -> Floats:

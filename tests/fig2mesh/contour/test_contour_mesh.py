@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from exporters.solid import measure_topology
+from fig2mesh.contour.contour import on_the_ground
 from fig2mesh.contour.contour_mesh import front_of, hull, ribbon
 from fig2mesh.contour.inset import continued_over, inset, steady
 from fig2mesh.contour.rim import Rim, rim_of
@@ -75,6 +76,16 @@ def test_inset_turns_no_triangle_over_and_stays_inside_of_thin_things(width: flo
     if width > 0.1:
         # 0.35 of a thickness of 0.1, from both sides.
         assert body.distance(moved).min() > -0.04
+
+
+def test_soles_stay_on_the_ground(ball: Ball) -> None:
+    mesh, normals, _ = ball
+    moved = inset(mesh, normals, np.full(len(mesh.vertices), WIDTH))
+    stood = on_the_ground(mesh, moved, WIDTH)
+    assert stood[:, 1].min() == mesh.vertices[:, 1].min() < moved[:, 1].min()
+    high = mesh.vertices[:, 1] > mesh.vertices[:, 1].min() + WIDTH
+    assert (stood[high] == moved[high]).all()
+    assert (stood[:, [0, 2]] == moved[:, [0, 2]]).all()
 
 
 def test_equal_readings_are_continued_over_the_whole_surface(ball: Ball) -> None:
