@@ -17,13 +17,10 @@ from fig2mesh.mesh.normals import vertex_normals
 from fig2mesh.records import ByteArray, Figure, FloatArray, Mesh
 from fig2mesh.settings import Contours
 from fig2mesh.texture.bare import without_line
-from fig2mesh.texture.drawn_line import drawn_line, paper_beside
+from fig2mesh.texture.drawn_line import drawn_line, paper_beside, with_soft_edge
 from fig2mesh.texture.sources import continued
 
 Floats = NDArray[np.float64]
-
-WIDER, SOFT_PX = 1.1, 0.75
-"""Width of the ribbon relative to the line's, and what is added for its soft edge, pixels."""
 
 MAX_OUTSIDE = 0.1
 """Largest distance of the ribbon's inner edge off the surface, relative to its width."""
@@ -77,13 +74,13 @@ def contour_of(figure: Figure, frame: ImageFrame, meshes: tuple[Mesh, ...], body
         readings = steady(rim, line.width)
         if contours == "keep":
             # A ribbon shows the drawing itself, soft edges and what is beside them included.
-            readings = np.where(readings > 0, WIDER * readings + SOFT_PX * frame.units_per_px, readings)
+            readings = with_soft_edge(readings, frame.units_per_px)
         widths = np.maximum(continued_over(mesh, rim, readings[:, None])[:, 0], 0.0)
         colors = _of_pens(continued_over(mesh, rim, np.where(drawn[:, None], line.color, np.nan)), line.pens)
         moved = on_the_ground(mesh, inset(mesh, normals, widths), float(np.median(line.width[drawn])))
         # Thin things are inset by less than the line's width, and the rest of the line stays on the surface.
         taken = rim.at(np.linalg.norm(mesh.vertices - moved, axis=1))
-        stands = _standing(mesh, rim, line.width, taken, body)
+        stands = _standing(mesh, rim, readings > 0, taken, body)
         if bare is None:
             width = float(np.median(line.width[drawn]))
             off = shown & (stands >= MIN_TAKEN * rim.at(widths))
@@ -114,12 +111,12 @@ def _of_pens(colors: Floats, pens: Floats) -> Floats:
     return np.asarray(pens[np.linalg.norm(colors[:, None] - pens, axis=-1).argmin(axis=1)])
 
 
-def _standing(mesh: Mesh, rim: Rim, drawn: Floats, taken: Floats, body: Body) -> Floats:
+def _standing(mesh: Mesh, rim: Rim, drawn: NDArray[np.bool_], taken: Floats, body: Body) -> Floats:
     """(N,) width of the ribbon: 0 where it would be seen from the front and nothing is drawn, and where it would leave
     the body: on flat soles and hems the rim wanders, and its normal with it."""
     inwards = np.append(-rim.outwards, np.zeros((len(taken), 1)), axis=1)
     middle, end = (rim.points + share * taken[:, None] * inwards for share in (0.5, 1.0))
-    bare = ~(steady(rim, drawn) > 0) & _unobstructed(mesh, rim, middle)
+    bare = ~drawn & _unobstructed(mesh, rim, middle)
     outside = body.distance(end.astype(np.float32)) > MAX_OUTSIDE * taken
     return np.where(bare | outside, 0.0, taken)
 

@@ -107,10 +107,11 @@ def inset(mesh: Mesh, normals: FloatArray, width: Floats) -> FloatArray:
 
     No triangle is turned over: where one would be, the inset is reduced around it.
     """
-    outwards = _smoothed(mesh, np.asarray(normals, np.float64), SMOOTHING)
+    adjacent = _adjacency(mesh)
+    outwards = _smoothed(adjacent, np.asarray(normals, np.float64), SMOOTHING)
     outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-9)
     depth = np.minimum(width, MAX_OF_THICKNESS * thickness(mesh, -outwards))
-    depth = np.minimum(depth, np.maximum(_smoothed(mesh, depth[:, None], 2)[:, 0], 0.0))
+    depth = np.minimum(depth, np.maximum(_smoothed(adjacent, depth[:, None], 2)[:, 0], 0.0))
     before = face_vectors(mesh)
     length = np.linalg.norm(before, axis=1)
     for _ in range(ATTEMPTS):
@@ -122,25 +123,28 @@ def inset(mesh: Mesh, normals: FloatArray, width: Floats) -> FloatArray:
             return moved
         around = np.unique(mesh.faces[turned])
         depth[around] *= 0.6
-        depth = np.minimum(depth, np.maximum(_smoothed(mesh, depth[:, None], 1)[:, 0], 0.0) * 1.05)
+        depth = np.minimum(depth, np.maximum(_smoothed(adjacent, depth[:, None], 1)[:, 0], 0.0) * 1.05)
     depth[around] = 0.0
     return (mesh.vertices - depth[:, None] * outwards).astype(np.float32)
 
 
-def _laplacian(mesh: Mesh) -> Any:
-    """(V, V) graph Laplacian: number of neighbours minus adjacency."""
+def _adjacency(mesh: Mesh) -> Any:
+    """(V, V) 1 for each pair of neighbours."""
     edges = half_edges(mesh.faces)
     count = len(mesh.vertices)
     adjacent = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
     adjacent.data[:] = 1.0
+    return adjacent
+
+
+def _laplacian(mesh: Mesh) -> Any:
+    """(V, V) graph Laplacian: number of neighbours minus adjacency."""
+    adjacent = _adjacency(mesh)
     return diags_array(np.asarray(adjacent.sum(axis=1)).ravel()) - adjacent
 
 
-def _smoothed(mesh: Mesh, values: Floats, passes: int) -> Floats:
+def _smoothed(adjacent: Any, values: Floats, passes: int) -> Floats:
     """(V, K) means of values over each vertex and its neighbours, `passes` times."""
-    edges = half_edges(mesh.faces)
-    count = len(mesh.vertices)
-    adjacent = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
     valence = np.asarray(adjacent.sum(axis=1)).ravel()[:, None]
     for _ in range(passes):
         values = 0.5 * values + 0.5 * (adjacent @ values) / np.maximum(valence, 1.0)

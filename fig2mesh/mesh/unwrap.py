@@ -95,11 +95,11 @@ def _with_drawing(mesh: Mesh, drawn: Drawn, texture_size: int, padding: int) -> 
     rest = _part(mesh, ~drawn.faces)
     # A drawn pixel is a texel, or less of one where the texture is small.
     line = drawn.line_pixels, drawn.line_faces.astype(np.int64)
-    area = float(_flat_areas(pixels, local).sum() + _flat_areas(*line).sum())
+    seen = float(_flat_areas(pixels, local).sum())
+    area = seen + float(_flat_areas(*line).sum())
     usable = FILL * texture_size**2
     longest = float(np.ptp(np.concatenate([pixels, line[0]]), axis=0).max())
     scale = min(1.0, math.sqrt(MAX_DRAWN_SHARE * usable / max(area, 1e-9)), (texture_size - 4 * padding - 4) / longest)
-    seen = float(_flat_areas(pixels, local).sum())
     units = math.sqrt(seen / max(float(face_areas(mesh)[drawn.faces].sum()), 1e-12)) * scale
     layout = None
     if len(rest[1]):

@@ -10,5 +10,5 @@ from fig2mesh.settings import Contours
 
 
 def contour(figure: Figure, simplify: tuple[Mesh, ...], body: Body, *, contours: Contours) -> Contour:
-    """Inset surfaces of all levels, with the ribbon or the hull of the finest one."""
+    """Inset surfaces of all levels, each with its ribbon or hull."""
     return contour_of(figure, image_frame(figure), simplify, body, contours)

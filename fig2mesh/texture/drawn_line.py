@@ -30,6 +30,9 @@ MAX_WIDTH: Final = 0.06
 MAX_USUAL: Final = 0.035
 """Largest usual width of a pen's lines, FIGURE units; broader ones are areas, and the surface stays where it is."""
 
+WIDER, SOFT_PX = 1.1, 0.75
+"""Width of a line with its soft edge relative to that without, and what is added besides, pixels."""
+
 STEP_PX: Final = 0.25
 """Distance between the samples of a profile, pixels."""
 
@@ -91,6 +94,11 @@ class DrawnLine:
     width: Floats
     color: Floats
     pens: Floats
+
+
+def with_soft_edge(width: Floats, px: float) -> Floats:
+    """(N,) widths of lines with their soft edges; 0 and NaN stay; px : FIGURE units per pixel."""
+    return np.where(width > 0, WIDER * width + SOFT_PX * px, width)
 
 
 @dataclass(frozen=True)

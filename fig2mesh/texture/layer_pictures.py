@@ -63,8 +63,7 @@ class RasterDrawing:
 
 @dataclass(frozen=True)
 class LayerPictures:
-    """near, far : (h, w, 3) float32 0-255, colours of the sides towards and away from the viewer;
-    away : (h, w) float32, distance from the layer, pixels"""
+    """near, far : (h, w, 3) float32 0-255, colours of the sides towards and away from the viewer."""
 
     near: NDArray[np.float32]
     far: NDArray[np.float32]

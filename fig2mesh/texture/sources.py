@@ -1,7 +1,7 @@
-"""Colour sources of the surface: the drawing itself, and a plain version of it for sides that are not observed.
+"""Colour sources of the surface: the drawing itself, and plain pictures for what it does not show.
 
-The plain version keeps the drawing's flat colours and loses what a draughtsman would not repeat at the back: contours,
-buttons, eyes. It is a mode filter over a small palette: at every pixel the colour that dominates its neighbourhood.
+The plain pictures keep the drawing's flat colours and lose what a draughtsman would not repeat at the back: contours,
+buttons, eyes. Those of a layer's two sides are made by `fig2mesh.texture.layer_pictures`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fig2mesh.parts.canvas import Canvas
 from fig2mesh.parts.outline import Outline
 from fig2mesh.records import Figure
 from fig2mesh.texture.bare import without_line
-from fig2mesh.texture.drawn_line import drawn_line, paper_beside
+from fig2mesh.texture.drawn_line import drawn_line, paper_beside, with_soft_edge
 from fig2mesh.texture.heads import find_face, in_profile
 from fig2mesh.texture.layer_pictures import RasterDrawing, foreign_pixels, layer_pictures
 from fig2mesh.texture.materials import find_materials
@@ -43,9 +43,6 @@ LINE_WIDTH = 0.014
 
 PLAIN_SHARE = 0.625
 """Longest side of the plain pictures relative to the texture's: the texture shows no more of them."""
-
-WIDER, SOFT_PX = 1.1, 0.75
-"""Width of what is taken off relative to the line's, and what is added for its soft edge, pixels."""
 
 GRAZING = 0.0
 """Threshold of the normal's z: a contour at the rim is drawn out along the side. At -0.1 fronts come nearer to the
@@ -191,7 +188,7 @@ def without_silhouette_line(
     line = drawn_line(picture, frame, points, outwards, np.ones(len(points), bool), paper)
     if not len(line.pens):
         return None
-    width = np.nan_to_num(WIDER * line.width + np.where(line.width > 0, SOFT_PX * frame.units_per_px, 0.0))
+    width = np.nan_to_num(with_soft_edge(line.width, frame.units_per_px))
     return without_line(picture, figure.mask, frame, points, width, line.color, margin_px=2)
 
 

@@ -28,9 +28,6 @@ from fig2mesh.texture.space import inwards, shown_alike, spread, trust
 SMOOTH_PX: Final = 2.5
 """Standard deviation of the average over changes, pixels."""
 
-MIN_INNER_PX: Final = 1.5
-"""Least distance of a pixel from the silhouette, pixels; nearer ones are visible at too much of a slant."""
-
 
 def front_picture(picture: NDArray[np.float32], frame: ImageFrame, sides: SideViews) -> NDArray[np.float32]:
     """(H, W, 3) the drawing, colours 0-255, resampled to the front view of `sides`."""

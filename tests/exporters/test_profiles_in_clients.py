@@ -25,6 +25,13 @@ from tests.node import ROOT, installed, runner
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
+def _browser() -> str:
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        pytest.skip(f"no browser ({', '.join(BROWSERS)}): CesiumJS not tried; apt-get install chromium")
+    return browser
+
+
 def _pixels(png: str) -> NDArray[np.int64]:
     with Image.open(io.BytesIO(base64.b64decode(png))) as image:
         return np.asarray(image.convert("RGB")).astype(np.int64)
@@ -34,9 +41,7 @@ def _pixels(png: str) -> NDArray[np.int64]:
 def test_cesiumjs_shows_compressed_models_like_plain_ones(
     tmp_path: Path, node_modules: Path, codecs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if browser is None:
-        pytest.skip(f"no browser ({', '.join(BROWSERS)}): CesiumJS not tried; apt-get install chromium")
+    browser = _browser()
     monkeypatch.setenv("NODE_PATH", str(codecs))
     names = (None, "cesiumjs", "cesiumjs-ktx2")
     models = []
@@ -69,9 +74,7 @@ def test_cesiumjs_shows_compressed_models_like_plain_ones(
 def test_cesiumjs_shows_outlines_without_hiding_the_figure(
     tmp_path: Path, node_modules: Path, codecs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if browser is None:
-        pytest.skip(f"no browser ({', '.join(BROWSERS)}): CesiumJS not tried; apt-get install chromium")
+    browser = _browser()
     monkeypatch.setenv("NODE_PATH", str(codecs))
     shapes = {
         "bare": capsule(),
