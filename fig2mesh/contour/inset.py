@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from fig2mesh.contour.rim import Rim
+from fig2mesh.mesh.raycast import scene_of
 from fig2mesh.mesh.topology import face_vectors, half_edges
 from fig2mesh.records import FloatArray, Mesh
 
@@ -84,10 +85,7 @@ def thickness(mesh: Mesh, inwards: Floats) -> Floats:
     """(V,) length of the solid below each vertex, along five directions within 30 degrees of `inwards` (V, 3)."""
     import open3d as o3d
 
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(
-        o3d.core.Tensor.from_numpy(np.array(mesh.vertices)), o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32))
-    )
+    scene = scene_of(mesh.vertices, mesh.faces)
     across = np.cross(inwards, np.where(np.abs(inwards[:, 2:]) < 0.7, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]]))
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
     third = np.cross(inwards, across)

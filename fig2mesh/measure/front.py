@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
+from fig2mesh.mesh.raycast import scene_of
 from fig2mesh.records import BoolArray, Mesh
 
 Surface = Mesh | TexturedMesh
@@ -147,7 +148,7 @@ def wall_share(front: FrontView) -> float:
 
 def thickness_at(mesh: Surface, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """(N,) thickness in metres of a closed surface, ASSET, at points (N, 2) x, y of the front view."""
-    scene, top = scene_of(mesh), _before(mesh)
+    scene, top = scene_of(mesh.vertices, mesh.faces), _before(mesh)
     thickness = np.zeros(len(points))
     waiting = np.arange(len(points))
     # A line of sight through an edge can hit both its triangles or none: such lines are moved a little.
@@ -185,7 +186,7 @@ def _covered(mesh: Surface, points: NDArray[np.float64]) -> BoolArray:
     import open3d as o3d
 
     lines = o3d.core.Tensor.from_numpy(_lines(points, _before(mesh)))
-    return np.asarray(scene_of(mesh).test_occlusions(lines).numpy())
+    return np.asarray(scene_of(mesh.vertices, mesh.faces).test_occlusions(lines).numpy())
 
 
 def _lines(points: NDArray[np.float64], top: float) -> NDArray[np.float32]:
@@ -197,13 +198,3 @@ def _lines(points: NDArray[np.float64], top: float) -> NDArray[np.float32]:
 def _before(mesh: Surface) -> float:
     """Some z in front of the whole surface."""
     return float(mesh.vertices[:, 2].max()) + 0.1
-
-
-def scene_of(mesh: Surface) -> Any:
-    """Open3D scene of a surface, for ray casting."""
-    import open3d as o3d
-
-    scene = o3d.t.geometry.RaycastingScene()
-    corners = o3d.core.Tensor.from_numpy(np.array(mesh.vertices, np.float32))
-    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)))
-    return scene

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from exporters.asset import OutlineMesh, TexturedMesh, without_outline
+from exporters.solid import unmatched_edges
 from fig2mesh.measure.solid import solid_mesh
-from fig2mesh.mesh.topology import check_solid, component_volumes, edge_keys, face_components, face_vectors, half_edges
+from fig2mesh.mesh.topology import check_solid, component_volumes, face_components, face_vectors
 from fig2mesh.records import Mesh
 
 
@@ -37,7 +38,7 @@ def outline_laws(mesh: TexturedMesh) -> OutlineLaws:
     places, surface = (array.astype(np.float64) for array in (outline.vertices, outline.surface))
     beyond = np.maximum(surface.min(axis=0) - places, places - surface.max(axis=0))
     return OutlineLaws(
-        closed=_closed(outline),
+        closed=unmatched_edges(outline.faces) == 0,
         inverted=not outline.culled or _inverted(outline),
         outside_m=max(float(beyond.max()), 0.0),
         turned=turned_triangles(mesh),
@@ -49,12 +50,6 @@ def turned_triangles(mesh: TexturedMesh) -> int:
     before, after = (face_vectors(solid_mesh(one)) for one in (without_outline(mesh), mesh))
     sound = np.linalg.norm(before, axis=1) > 0
     return int((np.einsum("fd,fd->f", before, after)[sound] <= 0).sum())
-
-
-def _closed(outline: OutlineMesh) -> bool:
-    edges, count = half_edges(outline.faces), len(outline.vertices)
-    there, back = (np.sort(edge_keys(way, count, directed=True)) for way in (edges, edges[:, ::-1]))
-    return bool((there == back).all())
 
 
 def _inverted(outline: OutlineMesh) -> bool:

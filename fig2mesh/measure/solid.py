@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from exporters.asset import TexturedMesh
 from exporters.solid import solid_of
-from fig2mesh.measure.front import Surface, scene_of
+from fig2mesh.measure.front import Surface
+from fig2mesh.mesh.raycast import scene_of
 from fig2mesh.mesh.simplify import spread
 from fig2mesh.mesh.slivers import triangle_quality
 from fig2mesh.mesh.topology import check_solid, component_volumes, face_components, select_faces
@@ -92,7 +93,7 @@ def thinnest_wall(mesh: Surface) -> Wall:
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
     inward = -normals[faces]
     rays = np.concatenate([points + START * inward, inward], axis=1).astype(np.float32)
-    answer = scene_of(body).cast_rays(o3d.core.Tensor.from_numpy(rays))
+    answer = scene_of(body.vertices, body.faces).cast_rays(o3d.core.Tensor.from_numpy(rays))
     met, across = answer["primitive_ids"].numpy(), answer["t_hit"].numpy().astype(np.float64)
     hit = np.isfinite(across)
     hit[hit] = np.einsum("nd,nd->n", normals[met[hit]], inward[hit]) > 0
@@ -138,7 +139,7 @@ def inner_shells(mesh: Mesh) -> int:
     for number, piece in enumerate(pieces):
         points = o3d.core.Tensor.from_numpy(np.array(piece.vertices))
         count += bool(volumes[number] < 0) or any(
-            float(scene_of(other).compute_occupancy(points).numpy().mean()) > 0.5
+            float(scene_of(other.vertices, other.faces).compute_occupancy(points).numpy().mean()) > 0.5
             for place, other in enumerate(pieces)
             if place != number and volumes[place] > abs(volumes[number])
         )

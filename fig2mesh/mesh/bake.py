@@ -17,6 +17,7 @@ from scipy import ndimage
 from fig2mesh.counters import count
 from fig2mesh.field.body import Body
 from fig2mesh.image_frame import ImageFrame
+from fig2mesh.mesh.raycast import scene_of
 from fig2mesh.records import ByteArray, FloatArray, Mesh, UvMesh
 from fig2mesh.texture.sources import Sources
 
@@ -170,9 +171,7 @@ def visible_points(mesh: Mesh, points: NDArray[np.float64], normals: NDArray[np.
     """(N,) bool: points of a surface with nothing between them and the viewer of the drawing; normals : (N, 3) unit."""
     import open3d as o3d
 
-    scene = o3d.t.geometry.RaycastingScene()
-    corners = o3d.core.Tensor.from_numpy(np.array(mesh.vertices))
-    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)))
+    scene = scene_of(mesh.vertices, mesh.faces)
     start = points + CLEARANCE * normals
     rays = np.concatenate([start, np.broadcast_to([0.0, 0.0, 1.0], start.shape)], axis=1).astype(np.float32)
     return np.asarray(~scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy())

@@ -73,12 +73,7 @@ class MeshCaster:
         return None if outline is None else self._scene_of(outline.vertices, outline.faces)
 
     def _scene_of(self, vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> Any:
-        import open3d as o3d
-
-        scene = o3d.t.geometry.RaycastingScene()
-        corners = np.ascontiguousarray((vertices - self.centre) / self.unit, np.float32)
-        scene.add_triangles(o3d.core.Tensor.from_numpy(corners), o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
-        return scene
+        return scene_of((vertices - self.centre) / self.unit, faces)
 
     def cast(self, origins: NDArray[Any], directions: NDArray[Any]) -> MeshHits:
         """First intersection of each of N rays, (N, 3) both, with the mesh or its outline."""
@@ -150,6 +145,16 @@ def _texture_colours(texture: Texture, uv: NDArray[Any]) -> NDArray[np.floating]
     """(M, 3) sRGB 0-255 of a texture of one, three or four channels at (M, 2) texture coordinates."""
     texels = sample(texture, uv)
     return np.repeat(texels, 3, axis=1).astype(np.float32) if texels.shape[1] == 1 else texels[:, :3] * 1.0
+
+
+def scene_of(vertices: NDArray[Any], faces: NDArray[Any]) -> Any:
+    """Open3D scene of triangles, for ray casting; vertices : (V, 3); faces : (F, 3)."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    corners = o3d.core.Tensor.from_numpy(np.array(vertices, np.float32, order="C"))
+    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(faces.astype(np.uint32)))
+    return scene
 
 
 def shown_vertices(mesh: TexturedMesh) -> NDArray[np.float32]:
