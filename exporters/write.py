@@ -91,8 +91,8 @@ def check_outputs(
     lods: int = 1,
     tiles_version: TilesVersion = "1.1",
     profile: Profile = GENERAL,
-) -> None:
-    """Check before the work begins that outputs can be written.
+) -> frozenset[str]:
+    """Check before the work begins that outputs can be written; returns absolute paths of all files they consist of.
 
     paths : all outputs of one asset
     overwrite : existing files may be replaced
@@ -122,6 +122,7 @@ def check_outputs(
         if parts[key].suffix.lower() in (".czml", ".geojson"):
             continue  # their model is the requested one
         raise ExportError(key, f"also a part of {parts[key]}", "choose another name or folder for one of them")
+    return frozenset(known | set(parts))
 
 
 def write(

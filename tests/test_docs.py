@@ -25,7 +25,7 @@ PATH = re.compile(rf"(?:{'|'.join(PACKAGES)}|tests|examples)/[\w./-]*|[\w-]+(?:/
 NAME = re.compile(rf"(?:{'|'.join(PACKAGES)})(?:\.\w+)+")
 PLACEHOLDER = re.compile(r"\bNAME\b")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
-COMMAND = re.compile(r"^(?: {4}|)(fig2mesh .*(?:\\\n.*)*)|`(fig2mesh [^`]+)`", re.MULTILINE)
+COMMAND = re.compile(r"^(?: {4}|)(fig2mesh (?:.*\\\n)*.*)|`(fig2mesh [^`]+)`", re.MULTILINE)
 OPTION = re.compile(r"(?<=\s)--?[a-z][a-z-]*")
 
 

@@ -24,4 +24,19 @@ def inspect(files: tuple[Path, ...], as_json: bool) -> None:
     for path, found in facts.items():
         click.echo(path)
         for key, value in found.items():
-            click.echo(f"  {key}: {value if not isinstance(value, dict | list) else json.dumps(value)}")
+            if value is not None:
+                click.echo(f"  {key}: {shown(value)}")
+
+
+def shown(value: object) -> str:
+    """A fact as text for people: numbers to seven decimals (a degree: 1 cm), small ones to three digits."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.3g}" if abs(value) < 1e-3 else f"{round(value, 7):.12g}"
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {shown(each)}" for key, each in value.items() if each is not None)
+    if isinstance(value, list | tuple):
+        nested = any(isinstance(each, list | tuple | dict) for each in value)
+        return ("; " if nested else ", ").join(map(shown, value))
+    return str(value)

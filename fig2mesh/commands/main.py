@@ -133,13 +133,32 @@ def _check_command(args: Sequence[str], commands: Collection[str]) -> None:
     followed = len(args) > 1 and not args[1].startswith("-")
     if suffix and not followed:
         return
-    if difflib.get_close_matches(word, commands, 1):
+    # Two words in a row that are no command and no file can only be a command that does not exist, and its argument.
+    if difflib.get_close_matches(word, commands, 1) or (followed and not suffix):
         raise click.UsageError(_unknown(args[0], commands))
 
 
 def _unknown(word: str, commands: Collection[str]) -> str:
     near = difflib.get_close_matches(os.path.splitext(word)[0], commands, 1)
     return f"unknown command {word!r:.80}" + (f" (did you mean {near[0]!r}?)" if near else "")
+
+
+def _usage(error: click.ClickException, words: Sequence[str]) -> str:
+    """One line for wrong usage: the finding, the values that an option takes, and the help that lists it."""
+    message = " ".join(error.format_message().split()).rstrip(".")
+    path, command = ["fig2mesh"], cli.commands["make"]
+    group: click.Command = cli
+    for word in words:
+        if not isinstance(group, click.Group) or word not in group.commands:
+            break
+        path.append(word)
+        group = command = group.commands[word]
+    if isinstance(error, click.BadOptionUsage) and "requires" in message:
+        options = [each for each in command.params if error.option_name in each.opts]
+        message += "".join(f", {each.metavar}" for each in options if each.metavar and each.nargs > 1)
+    if message.startswith("Got unexpected extra argument") and path == ["fig2mesh"]:
+        return f"{message}; give one figure, or a table of figures to fig2mesh batch"
+    return f"{message}; see {' '.join(path)} --help"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -156,8 +175,7 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo(error.format_message(), err=True)
         return 2
     except click.ClickException as error:
-        message = " ".join(error.format_message().split())
-        click.echo(f"fig2mesh: {message.rstrip('.')}; see fig2mesh --help", err=True)
+        click.echo(f"fig2mesh: {_usage(error, words)}", err=True)
         return 2
     except InputError as error:
         click.echo("fig2mesh: " + " ".join(str(error).split()), err=True)

@@ -25,8 +25,9 @@ def run(request: Request, quiet: bool = False) -> None:
     """Convert the figure of a request and write its outputs. Raises InputError."""
     from fig2mesh.conversion.convert import convert
     from fig2mesh.conversion.observer import Observer
-    from fig2mesh.conversion.outputs import check_request, near_note, write_outputs
+    from fig2mesh.conversion.outputs import check_request, models_of, near_note, write_outputs
     from fig2mesh.conversion.place import clamp_note, log_place
+    from fig2mesh.conversion.summary import opening, summary_of
     from fig2mesh.conversion.text_file import write_text
     from fig2mesh.counters import counting
 
@@ -36,14 +37,21 @@ def run(request: Request, quiet: bool = False) -> None:
     with progress(quiet) as advance, counting() as counts:
         observer = Observer(advance)
         done = convert(request, observer=observer)
-        log_place(done.placed, clamp_note(request, request.targets), near_note(request, done.placed.height_m))
+        log_place(
+            done.placed, clamp_note(request, models_of(request.targets)), near_note(request, done.placed.height_m)
+        )
         for note in done.notes:
             log.warning("%s: %s", request.figure, note)
-        written = write_outputs(done.asset, request, observer)
+        written = write_outputs(done, request, observer)
     if request.report is not None:
         from fig2mesh.conversion.report import make_report
 
         facts = make_report(done, written, observer, counts)
         write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
-    for target in request.targets:
-        log.info("%s", target)
+    log.info("%s", summary_of(done))
+    opened = opening(request.targets, request.has_place)
+    if opened is not None:
+        log.info("%s", opened)
+    if not quiet:
+        for target in request.targets:
+            click.echo(target)

@@ -196,7 +196,8 @@ class OutputOptions:
         metavar="OUT",
         column=False,
         help="Output file: .glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson; or a folder or tileset.json for "
-        "3D Tiles. Repeatable. Default: FIGURE with the suffix .glb, in the current folder.",
+        "3D Tiles; .png or .jpg: a picture of the model. Repeatable. Default: FIGURE with the suffix .glb, in the "
+        "current folder.",
     )
     profile: ProfileName | None = option(
         default=None,

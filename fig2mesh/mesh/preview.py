@@ -38,6 +38,8 @@ KEY_LIGHT = (-0.30, 0.45, 0.84)
 """VIEW; a head-light moved a little to the upper left, so that forms facing the camera still show relief."""
 RAYS_AT_ONCE = 1 << 20
 """Rays per batch: about 150 MB of rays, hits and samples."""
+PICTURES = {".png": "PNG", ".jpg": "JPEG", ".jpeg": "JPEG"}
+"""Formats of previews by suffix."""
 MARGIN = 0.04
 """Margin of a picture, share of its height."""
 
@@ -154,17 +156,24 @@ def views_sheet(
 
 
 def write_preview(
-    mesh: TexturedMesh, path: Path | str, *, drawing_rgba: ByteArray | None = None, height: int = 640
+    mesh: TexturedMesh,
+    path: Path | str,
+    *,
+    drawing_rgba: ByteArray | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    height: int = 640,
 ) -> None:
-    """Write front, side and back views (after the drawing, if given) as one PNG file, whole or not at all.
+    """Write front, oblique, side and back views (after the drawing, if given) as one picture, whole or not at all.
 
-    mesh : ASSET; drawing_rgba : (H, W, 4) uint8; height : pixels. Raises OSError where the disk refuses.
+    mesh : ASSET; path : with a suffix of `PICTURES`; drawing_rgba : (H, W, 4) uint8; mask : (H, W) bool, the figure's
+    silhouette; height : pixels. Raises OSError where the disk refuses.
     """
     from PIL import Image
 
-    sheet = views_sheet(mesh, drawing_rgba, yaws=(0, 90, 180), height=height)
-    with atomic_path(Path(path)) as partial:
-        Image.fromarray(sheet).save(partial, "PNG")
+    path = Path(path)
+    sheet = views_sheet(mesh, drawing_rgba, mask=mask, height=height)
+    with atomic_path(path) as partial:
+        Image.fromarray(sheet).save(partial, PICTURES[path.suffix.lower()], quality=90)
 
 
 def _fitted(bounds: Bounds, size: tuple[int, int]) -> Bounds:

@@ -101,6 +101,18 @@ UNKNOWN = {
     "misspelt, with an option first": (["batsh", "-o", "out"], "unknown command 'batsh' (did you mean 'batch'?)"),
     "help on a misspelt one": (["help", "viev"], "unknown command 'viev' (did you mean 'view'?)"),
     "help on nothing like it": (["help", "xyzzy"], "unknown command 'xyzzy'"),
+    "nothing like it, with a figure": (["convert", "a.png"], "unknown command 'convert'"),
+    "two figures": (["a.png", "b.png"], "Got unexpected extra argument (b.png); give one figure, or a table"),
+    "a value missing": (["a.png", "--lonlat", "47,8.5"], "Option '--lonlat' requires 2 arguments, LON LAT"),
+    "a value of a command missing": (
+        ["globe", "a.glb", "--overlay", "a.png"],
+        "Option '--overlay' requires 5 arguments, IMAGE W S E N; see fig2mesh globe --help",
+    ),
+    "an argument of a command missing": (["render"], "Missing argument 'FIGURE'; see fig2mesh render --help"),
+    "an option of another command": (
+        ["inspect", "a.glb", "--lods", "3"],
+        "No such option '--lods'; see fig2mesh inspect --help",
+    ),
     "a figure without suffix": (["xyzzy"], "xyzzy: no such file"),
     "a figure named like a command": (["view.png"], "view.png: no such file"),
 }
@@ -115,7 +127,8 @@ def test_an_unknown_command_is_one_line(
     assert main(words) == 2
     captured = capfd.readouterr()
     assert captured.out == ""
-    assert captured.err.startswith(f"fig2mesh: {expected}; ")
+    assert captured.err.startswith(f"fig2mesh: {expected}")
+    assert "; " in captured.err.removeprefix("fig2mesh: ")
     assert captured.err.count("\n") == 1
 
 
