@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import click
+
 log = logging.getLogger("fig2mesh")
 
 
@@ -18,6 +20,13 @@ def configure_logging(quiet: bool, verbose: int) -> None:
     log.handlers[:] = [handler]
     log.setLevel(level)
     log.propagate = False
+
+
+def print_outputs(*paths: object) -> None:
+    """List files on stdout, one a line, for scripts; nothing with --quiet."""
+    if log.isEnabledFor(logging.INFO):
+        for path in paths:
+            click.echo(str(path))
 
 
 @contextmanager

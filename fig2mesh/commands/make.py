@@ -9,7 +9,7 @@ import click
 
 from fig2mesh.commands.options import messages, request_options
 from fig2mesh.conversion.request import Request
-from fig2mesh.terminal import configure_logging, log, progress
+from fig2mesh.terminal import configure_logging, log, print_outputs, progress
 
 
 @click.command("make", hidden=True)
@@ -52,6 +52,4 @@ def run(request: Request, quiet: bool = False) -> None:
     opened = opening(request.targets, request.has_place)
     if opened is not None:
         log.info("%s", opened)
-    if not quiet:
-        for target in request.targets:
-            click.echo(target)
+    print_outputs(*request.targets)

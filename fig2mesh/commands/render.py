@@ -17,4 +17,4 @@ def render(request: RenderRequest, quiet: bool, verbose: int) -> None:
     from fig2mesh.render.job import run
 
     configure_logging(quiet, verbose)
-    run(request)
+    run(request, quiet)

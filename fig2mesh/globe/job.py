@@ -12,6 +12,7 @@ from fig2mesh.errors import OutputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
 from fig2mesh.globe.request import GlobeRequest
+from fig2mesh.terminal import print_outputs
 from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.server import page_server, show
 
@@ -41,7 +42,8 @@ def run(
         return
     write_folder(output, page, files, built)
     size = sum(file.stat().st_size for file in output.rglob("*") if file.is_file())
-    log.info("%s: %.0f MB; serve it, for instance: python -m http.server -d %s", output, size / 1e6, output)
+    log.info("a page of %.0f MB; serve it, for instance: python -m http.server -d %s", size / 1e6, output)
+    print_outputs(output)
 
 
 def write_folder(folder: Path, page: str, files: dict[str, Path], cesium: Path) -> None:

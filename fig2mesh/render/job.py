@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from fig2mesh.settings import Settings
 from fig2mesh.stages.body import body
 from fig2mesh.stages.parts import parts
 from fig2mesh.stages.textures import textures
+from fig2mesh.terminal import print_outputs, progress
 from georef.bearing import parse_facing
 from georef.placement import check_lonlat
 
@@ -58,8 +59,8 @@ class _Total:
     pictures: int = 0
 
 
-def run(request: RenderRequest) -> None:
-    """Run `fig2mesh render`."""
+def run(request: RenderRequest, quiet: bool = False) -> None:
+    """Run `fig2mesh render`; quiet : without progress."""
     # Whatever can be rejected is rejected before the work begins.
     wanted = parse_effects(request.effects)
     fields = request.figure.suffix.lower() not in SUFFIXES
@@ -88,14 +89,16 @@ def run(request: RenderRequest) -> None:
     first = _with_drawn_line(first, scene, request.outline_width)
     ready = time.perf_counter()
     total = _Total()
-    written = write_pictures(request.output, _turntable(scene, first, count, total), rate, request.overwrite)
+    with progress(quiet or count == 1) as advance:
+        pictures = _turntable(scene, first, count, total, advance)
+        written = write_pictures(request.output, pictures, rate, request.overwrite)
     done = time.perf_counter()
     if request.report is not None:
         facts = _facts(request, first, scene, total, sun)
         facts["seconds"] = {"scene": round(ready - start, 3), "pictures": round(done - ready, 3)}
         facts["files"] = [path.name for path in written]
         write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
-    log.info("%s", request.output)
+    print_outputs(request.output)
 
 
 def _picture_request(request: RenderRequest, wanted: frozenset[Effect], sun: Sun | None) -> PictureRequest:
@@ -127,9 +130,12 @@ def _with_drawn_line(request: PictureRequest, scene: Scene, width_px: float | No
     return request if width_px is None else replace(request, outline_px=width_px)
 
 
-def _turntable(scene: Scene, request: PictureRequest, count: int, total: _Total) -> Iterator[ByteArray]:
-    """Yield `count` pictures of a full turn, beginning with the requested one."""
+def _turntable(
+    scene: Scene, request: PictureRequest, count: int, total: _Total, advance: Callable[[str], object]
+) -> Iterator[ByteArray]:
+    """Yield `count` pictures of a full turn, beginning with the requested one; advance : called before each."""
     for index in range(count):
+        advance(f"picture {index + 1} of {count}")
         picture = render(scene, replace(request, yaw_deg=request.yaw_deg + 360.0 * index / count))
         total.counts += picture.counts
         total.pictures += 1

@@ -17,7 +17,7 @@ from fig2mesh.settings import Settings
 from fig2mesh.stages.body import body
 from fig2mesh.stages.lift import lift
 from fig2mesh.stages.textures import textures
-from fig2mesh.terminal import progress
+from fig2mesh.terminal import print_outputs, progress
 from fig2mesh.view.cesium import CESIUM, find_cesium
 from fig2mesh.view.globe import globe_page
 from fig2mesh.view.page import EFFECTS, view_page
@@ -48,7 +48,8 @@ def run(request: ViewRequest, quiet: bool = False) -> None:
         page = view_page(scene, wanted) if at is None else globe_page(scene, at, f"{CESIUM}/", wanted)
     if request.output is not None:
         write_text(request.output, page, "-o")
-        log.info("%s: %.1f MB", request.output, len(page) / 1e6)
+        log.info("a page of %.1f MB", len(page) / 1e6)
+        print_outputs(request.output)
         return
     show(page_server(page, request.port, folders), request.open)
 

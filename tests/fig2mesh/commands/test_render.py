@@ -134,9 +134,10 @@ def test_sun_goes_round_with_the_day(model: Path, tmp_path: Path) -> None:
 def test_night_is_reported_in_one_line(model: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     options = [*SUN, "--time", "2026-06-21T23:30Z", "-o", str(tmp_path / "a.png")]
     assert main(["render", str(model), *SMALL, *options]) == 0
-    printed = capfd.readouterr().err
-    assert printed.count("below the horizon") == 1
-    assert printed.count("\n") == 2
+    printed = capfd.readouterr()
+    assert printed.err.count("below the horizon") == 1
+    assert printed.err.count("\n") == 1
+    assert printed.out == f"{tmp_path / 'a.png'}\n"
 
 
 BAD = {
