@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exporters.text import plain_texts
 from georef.placement import GeoPlacement
 
 FloatArray = NDArray[np.float32]
@@ -191,6 +192,8 @@ class Asset:
     copyright : attribution line, may be empty
     lit : True: clients shade the surface; False: they show its colours unlit, in formats that support it
     metadata : JSON-serialisable facts about the figure (source, seed, version, observed share ...)
+
+    Texts are made representable in UTF-8, see `exporters.text`.
     """
 
     name: str
@@ -204,6 +207,8 @@ class Asset:
     def __post_init__(self) -> None:
         if not self.lods:
             raise ValueError("lods: empty, expected at least one mesh")
+        for name in ("name", "copyright", "metadata"):
+            object.__setattr__(self, name, plain_texts(getattr(self, name)))
 
     @property
     def mesh(self) -> TexturedMesh:

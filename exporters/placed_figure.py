@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from exporters.asset import Asset
 from exporters.errors import ExportError
 from exporters.sampling import face_parts, observed_shares
+from exporters.text import plain_text
 from georef.geodesy import ecef_from_tile, tile_from_asset
 from georef.placement import GeoPlacement
 
@@ -73,14 +74,14 @@ def plain_attributes(given: Mapping[str, Any] | Iterable[tuple[str, Any]]) -> At
     Raises ValueError for a value of another type.
     """
     pairs = given.items() if isinstance(given, Mapping) else given
-    return tuple((_plain_text(str(name)), _plain(name, value)) for name, value in pairs)
+    return tuple((plain_text(str(name)), _plain(name, value)) for name, value in pairs)
 
 
 def _plain(name: str, value: Any) -> Value:
     if value is None or type(value) is bool:
         return value
     if isinstance(value, str):
-        return _plain_text(value)
+        return plain_text(value)
     if isinstance(value, np.bool_):
         return bool(value)
     if isinstance(value, Integral):
@@ -89,12 +90,6 @@ def _plain(name: str, value: Any) -> Value:
     if isinstance(value, Real):
         return float(value) if math.isfinite(value) else None
     raise ValueError(f"attribute {name!r} is of type {type(value).__name__}")
-
-
-def _plain_text(text: str) -> str:
-    if text.isascii() and "\0" not in text:
-        return str(text)  # also converts subclasses
-    return text.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
 
 
 def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -26,7 +27,7 @@ def print_outputs(*paths: object) -> None:
     """List files on stdout, one a line, for scripts; nothing with --quiet."""
     if log.isEnabledFor(logging.INFO):
         for path in paths:
-            click.echo(str(path))
+            click.echo(os.fsencode(str(path)))  # names of files may be no UTF-8
 
 
 @contextmanager

@@ -49,6 +49,8 @@ GROUPS = {
 }
 """Sections of the help, and the part of a request that each describes."""
 
+MORE_MEMORY = "free some, raise the limit of the address space (ulimit -v), or use --quality draft"
+
 
 class MainCommandGroup(click.Group):
     """A group whose first argument may be a figure: then the main command runs."""
@@ -161,6 +163,23 @@ def _usage(error: click.ClickException, words: Sequence[str]) -> str:
     return f"{message}; see {' '.join(path)} --help"
 
 
+def _os_error(error: OSError) -> str:
+    """One line for an error of the system: paths fail in more ways than can be listed, temporary folders in one."""
+    if _out_of_memory(error):
+        return f"out of memory; {MORE_MEMORY}"
+    if error.filename is None and "temporary directory" in str(error):
+        return "no temporary folder can be written; set TMPDIR to a folder that can be"
+    where = str(error.filename or "a file")
+    shown = where if len(where) < 200 else f"{where[:80]}…{where[-80:]}"
+    return f"{shown}: {error.strerror or 'cannot be used'}; check the path"
+
+
+def _out_of_memory(error: BaseException) -> bool:
+    """Whether an error comes from too little memory: Python's own, torch's, or of a library that cannot be mapped."""
+    signs = ("failed to map segment", "cannot allocate memory", "can't allocate memory", "bad_alloc")
+    return isinstance(error, MemoryError) or any(sign in str(error).lower() for sign in signs)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 success, 2 bad usage or input, 1 internal error."""
     from georef.errors import InputError
@@ -181,10 +200,7 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo("fig2mesh: " + " ".join(str(error).split()), err=True)
         return 2
     except OSError as error:
-        # Paths fail in more ways than can be listed: names too long, loops of links, folders that are files.
-        where = str(error.filename or "a file")
-        shown = where if len(where) < 200 else f"{where[:80]}…{where[-80:]}"
-        click.echo(f"fig2mesh: {shown}: {error.strerror or 'cannot be used'}; check the path", err=True)
+        click.echo(f"fig2mesh: {_os_error(error)}", err=True)
         return 2
     except (KeyboardInterrupt, click.Abort):
         click.echo("fig2mesh: interrupted; no output is half-written", err=True)
@@ -194,6 +210,9 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if verbosity(words) > 1:
             raise
+        if _out_of_memory(error):
+            click.echo(f"fig2mesh: out of memory; {MORE_MEMORY}", err=True)
+            return 2
         click.echo(f"fig2mesh: internal error: {type(error).__name__}: {error} (-vv shows where)", err=True)
         return 1
 

@@ -23,6 +23,7 @@ def make(request: Request, quiet: bool, verbose: int) -> None:
 
 def run(request: Request, quiet: bool = False) -> None:
     """Convert the figure of a request and write its outputs. Raises InputError."""
+    from exporters.text import plain_texts
     from fig2mesh.conversion.convert import convert
     from fig2mesh.conversion.observer import Observer
     from fig2mesh.conversion.outputs import check_request, models_of, near_note, write_outputs
@@ -46,7 +47,7 @@ def run(request: Request, quiet: bool = False) -> None:
     if request.report is not None:
         from fig2mesh.conversion.report import make_report
 
-        facts = make_report(done, written, observer, counts)
+        facts = plain_texts(make_report(done, written, observer, counts))
         write_text(request.report, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     log.info("%s", summary_of(done))
     opened = opening(request.targets, request.has_place)

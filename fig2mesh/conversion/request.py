@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
 
+from exporters.text import plain_text
 from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.errors import InputError
 from fig2mesh.settings import Closing, Contours, Mesher, Parts, Quality, Settings, Textures, settings_for
@@ -247,7 +248,7 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
     @property
     def targets(self) -> tuple[str, ...]:
         """The outputs, or the default output if none is named."""
-        return self.outputs or (self.figure.stem + ".glb",)
+        return self.outputs or (plain_text(self.figure.stem) + ".glb",)
 
     @property
     def title(self) -> str:
