@@ -24,6 +24,8 @@ def close_pymeshlab(mesh: Mesh) -> Mesh:
     try:
         import pymeshlab
     except ImportError as error:
+        if "failed to map segment" in str(error):
+            raise MemoryError(str(error)) from error  # the libraries are there
         raise InputError("--closing pymeshlab", f"cannot be imported ({error})", REMEDY) from error
     scene = pymeshlab.MeshSet(verbose=False)
     # Without libopengl0 the import passes, the plugins are not loaded, and filters are missing without an error.

@@ -37,7 +37,10 @@ def test_a_figure_whose_name_is_not_utf8(tmp_path: Path, monkeypatch: pytest.Mon
     words = [f"{MÜLLER}.png", "--keypoints", str(files.keypoints), *QUICK, "--lonlat", "8", "47"]
     outputs = ["-o", "a.gltf", "-o", "a.czml", "-o", "a.geojson", "-o", "a.usda", "-o", "tiles"]
     assert main([*words, *outputs, "--credit", MÜLLER, "--report", "report.json"]) == 0
-    assert json.loads(Path("a.gltf").read_text(encoding="utf-8"))["asset"]["extras"]["source"] == "M\ufffdller.png"
+    assert (
+        json.loads(Path("a.gltf").read_text(encoding="utf-8"))["asset"]["extras"]["metadata"]["source"]
+        == "M\ufffdller.png"
+    )
     assert "M\ufffdller.png" in json.loads(Path("report.json").read_text(encoding="utf-8"))["figure"]["file"]
     assert main(words) == 0
     assert Path("M\ufffdller.glb").exists()

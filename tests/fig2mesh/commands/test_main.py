@@ -229,3 +229,35 @@ def test_places_need_a_place(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     assert main(["figure.png", "-o", str(tmp_path / name)]) == 2
     suffix = Path(name).suffix
     assert f"{suffix} needs a place on the earth; give --lonlat LON LAT" in capsys.readouterr().err
+
+
+NO_MEMORY = {
+    "Python's own": MemoryError(),
+    "the system's": OSError(12, "Cannot allocate memory"),
+    "a library that cannot be mapped": ImportError("libQt5OpenGL.so.5: failed to map segment from shared object"),
+    "torch's": RuntimeError("[enforce fail] DefaultCPUAllocator: can't allocate memory: you tried to allocate 9 bytes"),
+    "a C++ library's": RuntimeError("std::bad_alloc"),
+}
+
+
+@pytest.mark.parametrize("case", NO_MEMORY)
+def test_too_little_memory_is_one_line(
+    files: DrawnFiles, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
+    def fail(*args: object, **options: object) -> None:
+        raise NO_MEMORY[case]
+
+    monkeypatch.setattr("fig2mesh.conversion.outputs.check_request", fail)
+    assert main(arguments(files)) == 2
+    assert capfd.readouterr().err.startswith("fig2mesh: out of memory; free some, raise the limit")
+
+
+def test_a_missing_temporary_folder_is_one_line(
+    files: DrawnFiles, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*args: object, **options: object) -> None:
+        raise FileNotFoundError(2, "No usable temporary directory found in ['/tmp', '/']")
+
+    monkeypatch.setattr("fig2mesh.conversion.outputs.check_request", fail)
+    assert main(arguments(files)) == 2
+    assert "set TMPDIR to a folder that can be" in capfd.readouterr().err
