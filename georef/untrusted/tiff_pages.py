@@ -50,7 +50,9 @@ def main_page(path: Path) -> TiffPage:
         pages = [file.pages[index] for index in range(min(len(file.pages), MAX_PAGES))]
         if not pages:
             raise DamagedFile("a TIFF without pages")
-        full = [(index, None, page) for index, page in enumerate(pages) if not _kind(page)]
+        full: list[tuple[int, int | None, Any]] = [
+            (index, None, page) for index, page in enumerate(pages) if not _kind(page)
+        ]
         if not full:
             full = [
                 (index, number, below)
@@ -93,4 +95,6 @@ def _kind(page: Any) -> int:
 def _value(value: Any) -> Any:
     if isinstance(value, str | bytes | tuple):
         return value
-    return (int(value),) if hasattr(value, "__index__") else (value,)
+    if hasattr(value, "ravel"):  # an array of NumPy, as palettes are
+        return tuple(value.ravel().tolist())
+    return (int(value),) if isinstance(value, int) else (value,)  # an int and not the enumeration's member
