@@ -60,9 +60,15 @@ def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> PictureView
     """
     if bbox is not None and is_large(path):
         header = read_header(path)
-        pixels, notes = read_window_of(path, header, bbox)
-        _log(path, notes)
-        return PictureView(pixels, bbox[:2], header.size)
+        width, height = header.size
+        try:
+            pixels, notes = read_window_of(path, header, bbox)
+            _log(path, notes)
+            return PictureView(pixels, bbox[:2], header.size)
+        except FigureError as error:
+            # Pillow decodes some compressions of TIFF that libvips does not.
+            if header.tiff is None or error.source != str(path) or width * height > MAX_PIXELS:
+                raise
     rgba, notes = _read(path, "figure", colours=True)
     _log(path, notes)
     height, width = rgba.shape[:2]

@@ -96,12 +96,17 @@ def to_srgb(samples: NDArray[Any], source: SourceColours) -> ByteArray:
         wide = np.repeat(samples, 3, axis=2) if samples.shape[2] == 1 and source.kind == "rgb" else samples
         return _converted(wide, source.profile, source.kind)
     if samples.dtype == np.uint16:
-        samples = ((samples.astype(np.uint32) + 128) // 257).astype(np.uint8)
+        samples = to_bytes(samples)
     if source.kind == "cmyk":
         light = 255 - samples.astype(np.uint32)
         product = light[..., :3] * light[..., 3:] + 128
         return np.asarray(((product >> 8) + product) >> 8, np.uint8)
     return samples if samples.shape[2] == 3 else np.repeat(samples, 3, axis=2)
+
+
+def to_bytes(values: NDArray[np.uint16]) -> ByteArray:
+    """Samples of 16 bits as 8 bits, rounded."""
+    return ((values.astype(np.uint32) + 128) // 257).astype(np.uint8)
 
 
 def _stated(header: PictureHeader) -> tuple[bytes | None, str | None]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fig2mesh.parse.libvips import libvips
-from fig2mesh.parse.profiles import BANDS, Kind, SourceColours, to_srgb
+from fig2mesh.parse.profiles import BANDS, Kind, SourceColours, to_bytes, to_srgb
 from fig2mesh.records import ByteArray
 from georef.untrusted.image_file import pillow
 from georef.untrusted.picture_header import PictureHeader
@@ -73,7 +73,7 @@ def to_rgba(samples: Samples, source: SourceColours) -> ByteArray:
         if alpha is None:
             rgba[top:bottom, :, 3] = 255
         else:
-            rgba[top:bottom, :, 3] = (_scaled(alpha, samples.white) + 128) // 257 if alpha.dtype != np.uint8 else alpha
+            rgba[top:bottom, :, 3] = alpha if alpha.dtype == np.uint8 else to_bytes(_scaled(alpha, samples.white))
     return rgba
 
 

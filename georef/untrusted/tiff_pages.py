@@ -20,8 +20,10 @@ REDUCED, MASK = 1, 4
 MAX_PAGES = 1000
 """Limit of pages that are looked at."""
 
-MAX_VALUES = 100_000
-"""Limit of values of a tag; those of strips and tiles, which may be more, are not wanted."""
+MAX_VALUES, MAX_BYTES = 100_000, 16 << 20
+"""Limits of values of a tag, and of bytes in a profile or packet; strips and tiles, which may be more, are left out."""
+
+BLOBS = frozenset((700, 34675))
 
 LISTS = frozenset((273, 279, 324, 325, 513, 514, 519, 520, 521))
 
@@ -61,7 +63,7 @@ def main_page(path: Path) -> TiffPage:
                 if not _kind(below)
             ][:1]
         index, subifd, page = full[0] if full else (0, None, pages[0])
-        tags = {tag.code: _value(tag.value) for tag in page.tags if tag.count <= MAX_VALUES and tag.code not in LISTS}
+        tags = {tag.code: _value(tag.value) for tag in page.tags if _wanted(tag)}
         return TiffPage((int(page.imagewidth), int(page.imagelength)), index, subifd, tags, max(len(full) - 1, 0))
 
 
@@ -90,6 +92,11 @@ def _kind(page: Any) -> int:
     tag, old = page.tags.get(NEW_SUBFILE_TYPE), page.tags.get(SUBFILE_TYPE)
     kind = int(tag.value) if tag is not None else 0
     return (kind & (REDUCED | MASK)) | (REDUCED if old is not None and old.value == 2 else 0)
+
+
+def _wanted(tag: Any) -> bool:
+    most = MAX_BYTES if tag.code in BLOBS else MAX_VALUES
+    return tag.count <= most and tag.code not in LISTS
 
 
 def _value(value: Any) -> Any:
