@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from georef.errors import PlacementError
-from georef.sheets.controls import Affine, Controls, FloatArray, read_text
+from georef.sheets.controls import Affine, Controls, FloatArray, read_text, seeming_size, size_text
 from georef.sheets.quality import distances_m
 from georef.sheets.reference import Plane
 from georef.untrusted.damage import DamagedFile
@@ -60,8 +60,7 @@ def check_controls(controls: Controls, size: Size | None, source: Path) -> list[
     outside = ((pixels < -margin) | (pixels > sides + margin)).any(axis=1)
     if outside.any():
         finding = f"{outside.sum()} of {len(pixels)} control points lie outside the sheet of {size_text(size)} px"
-        seem = _seeming_size(pixels, sides)
-        finding += f", as if made for a picture of about {size_text(seem)} px" if seem else ""
+        finding += seeming_size(pixels, sides)
         if outside.mean() >= 0.5:
             raise PlacementError(source, finding, "give the picture they were set on, or points in pixels of this one")
         return [f"{source}: {finding}; check that the picture is the one they were set on"]
@@ -72,18 +71,6 @@ def check_controls(controls: Controls, size: Size | None, source: Path) -> list[
             "check that they were not set on a smaller version of it"
         ]
     return []
-
-
-def _seeming_size(pixels: FloatArray, sides: FloatArray) -> Size | None:
-    """Size of the picture that points seem to be made for: this one times the least whole number that holds them."""
-    if (pixels < -0.5 * sides).any():
-        return None
-    factor = float(np.ceil((pixels / sides).max() - 0.02))
-    return None if factor > 20 else (float(sides[0] * factor), float(sides[1] * factor))
-
-
-def size_text(size: tuple[float, ...]) -> str:
-    return f"{size[0]:g}×{size[1]:g}"
 
 
 def picture_notes(picture: Path | None, size: Size | None, original: Size | None, georeference: object) -> list[str]:

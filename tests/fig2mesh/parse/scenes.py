@@ -119,9 +119,13 @@ ORIENTED: dict[str, Callable[[Array, int], bytes]] = {
     "png XMP attribute": lambda p, o: png(p, before=itxt(xmp(o))),
     "png XMP element": lambda p, o: png(p, before=itxt(xmp(o, element=True))),
     "png XMP packed": lambda p, o: png(p, after=itxt(xmp(o), packed=True)),
-    "png XMP of another prefix": lambda p, o: png(p, before=itxt(xmp(o).replace(b"tiff:", b"t:").replace(b":tiff", b":t"))),
+    "png XMP of another prefix": lambda p, o: png(
+        p, before=itxt(xmp(o).replace(b"tiff:", b"t:").replace(b":tiff", b":t"))
+    ),
     "png XMP in single quotes": lambda p, o: png(p, before=itxt(xmp(o).replace(b'"', b"'"))),
-    "png XMP in UTF-16": lambda p, o: png(p, before=itxt("\ufeff".encode("utf-16-le") + xmp(o).decode().encode("utf-16-le"))),
+    "png XMP in UTF-16": lambda p, o: png(
+        p, before=itxt("\ufeff".encode("utf-16-le") + xmp(o).decode().encode("utf-16-le"))
+    ),
     "png raw exif": lambda p, o: png(p, before=raw_profile("exif", exif(o))),
     "png raw exif packed": lambda p, o: png(p, after=raw_profile("exif", exif(o), b"zTXt")),
     "png raw APP1": lambda p, o: png(p, before=raw_profile("APP1", exif(o))),
@@ -135,7 +139,7 @@ ORIENTED: dict[str, Callable[[Array, int], bytes]] = {
     "webp EXIF": lambda p, o: pillow_file(p, "WEBP", lossless=True, exif=exif(o)),
     "webp XMP": lambda p, o: pillow_file(p, "WEBP", lossless=True, xmp=xmp(o)),
     "avif": lambda p, o: pillow_file(p, "AVIF", quality=100, subsampling="4:4:4", exif=exif(o)),
-}  # fmt: skip
+}
 """Places where a file states its orientation: writer of pixels as stored, and of the orientation."""
 
 
@@ -194,14 +198,15 @@ WAYS: dict[str, Callable[[Array], bytes]] = {
     "png sRGB profile": lambda p: png(p, icc_profile=SRGB),
     "png sRGB chunk": lambda p: png(p, before=chunk(b"sRGB", b"\0") + chunk(b"gAMA", struct.pack(">I", 100000))),
     "png gAMA of sRGB": lambda p: png(p, before=chunk(b"gAMA", struct.pack(">I", 45455))),
-    "png gAMA linear": lambda p: insert(
-        vips_file(deep_in(p, 1.0), ".png"), chunk(b"gAMA", struct.pack(">I", 100000))
-    ),
+    "png gAMA linear": lambda p: insert(vips_file(deep_in(p, 1.0), ".png"), chunk(b"gAMA", struct.pack(">I", 100000))),
     "png gAMA 1/1.8": lambda p: insert(vips_file(deep_in(p, 1.8), ".png"), chunk(b"gAMA", struct.pack(">I", 55556))),
     "png cICP sRGB": lambda p: png(p, before=chunk(b"cICP", bytes([1, 13, 0, 1]))),
     "png cICP Display P3": lambda p: png(in_profile(p, P3), before=chunk(b"cICP", bytes([12, 13, 0, 1]))),
-    "png cHRM of Adobe RGB": lambda p: png(in_profile(p, ADOBE), before=chunk(b"gAMA", struct.pack(">I", 45471)) + chunk(
-        b"cHRM", struct.pack(">8I", 31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000))),
+    "png cHRM of Adobe RGB": lambda p: png(
+        in_profile(p, ADOBE),
+        before=chunk(b"gAMA", struct.pack(">I", 45471))
+        + chunk(b"cHRM", struct.pack(">8I", 31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000)),
+    ),
     "png Adobe RGB": lambda p: png(in_profile(p, ADOBE), icc_profile=ADOBE),
     "png ProPhoto": lambda p: png(in_profile(p, PROPHOTO), icc_profile=PROPHOTO),
     "png Display P3": lambda p: png(in_profile(p, P3), icc_profile=P3),
@@ -211,9 +216,13 @@ WAYS: dict[str, Callable[[Array], bytes]] = {
     "jpeg Adobe RGB": lambda p: jpeg(in_profile(p, ADOBE), icc_profile=ADOBE),
     "webp": lambda p: pillow_file(p, "WEBP", lossless=True),
     "webp Display P3": lambda p: pillow_file(in_profile(p, P3), "WEBP", lossless=True, icc_profile=P3),
-    "webp animated": lambda p: pillow_file(p, "WEBP", lossless=True, save_all=True, append_images=[Image.new("RGB", p.shape[1::-1])]),
+    "webp animated": lambda p: pillow_file(
+        p, "WEBP", lossless=True, save_all=True, append_images=[Image.new("RGB", p.shape[1::-1])]
+    ),
     "apng": lambda p: png(p, save_all=True, append_images=[Image.new("RGB", p.shape[1::-1])]),
-    "mpo": lambda p: pillow_file(p, "MPO", quality=98, subsampling=0, save_all=True, append_images=[Image.new("RGB", (24, 18))]),
+    "mpo": lambda p: pillow_file(
+        p, "MPO", quality=98, subsampling=0, save_all=True, append_images=[Image.new("RGB", (24, 18))]
+    ),
     "bmp": lambda p: pillow_file(p, "BMP"),
     "ppm": lambda p: pillow_file(p, "PPM"),
     "jp2": lambda p: pillow_file(p, "JPEG2000", irreversible=False),
@@ -230,27 +239,35 @@ WAYS: dict[str, Callable[[Array], bytes]] = {
     "tiff JPEG": lambda p: vips_file(p, ".tif", compression="jpeg", Q=98),
     "tiff YCbCr": lambda p: ycbcr(p),
     "tiff 16 bit": lambda p: tiff(deep(p)),
-    "tiff 16 bit planes big endian": lambda p: tiff(np.moveaxis(deep(p), 2, 0).copy(), planarconfig="separate", byteorder=">"),
+    "tiff 16 bit planes big endian": lambda p: tiff(
+        np.moveaxis(deep(p), 2, 0).copy(), planarconfig="separate", byteorder=">"
+    ),
     "tiff 12 of 16 bit": lambda p: tiff(np.rint(p / 255 * 4095).astype(np.uint16)),
-    "tiff 14 of 16 bit, stated": lambda p: tiff(np.rint(p / 255 * 16383).astype(np.uint16), extratags=[(281, "H", 3, (16383,) * 3, True)]),
+    "tiff 14 of 16 bit, stated": lambda p: tiff(
+        np.rint(p / 255 * 16383).astype(np.uint16), extratags=[(281, "H", 3, (16383,) * 3, True)]
+    ),
     "tiff signed 16 bit": lambda p: tiff(np.rint(p / 255 * 32767).astype(np.int16)),
     "tiff float 0 to 1": lambda p: tiff((p / 255).astype(np.float32)),
     "tiff float 0 to 255": lambda p: tiff(p.astype(np.float32)),
     "tiff half": lambda p: tiff((p / 255).astype(np.float16)),
     "tiff unassociated alpha": lambda p: tiff(with_alpha(p), extrasamples=["unassalpha"]),
     "tiff band beyond colours": lambda p: tiff(with_alpha(p, 90), extrasamples=["unspecified"]),
-    "tiff near infrared and alpha": lambda p: tiff(with_alpha(with_alpha(p, 90)), extrasamples=["unspecified", "unassalpha"]),
+    "tiff near infrared and alpha": lambda p: tiff(
+        with_alpha(with_alpha(p, 90)), extrasamples=["unspecified", "unassalpha"]
+    ),
     "tiff Adobe RGB": lambda p: tiff(in_profile(p, ADOBE), iccprofile=ADOBE),
     "tiff 16 bit linear": lambda p: tiff(deep_in(p, 1.0), iccprofile=LINEAR),
     "tiff Lab": lambda p: pillow_lab(p),
     "tiff Lab 16 bit": lambda p: lab16(p),
     "tiff thumbnail first": lambda p: pages((p[::4, ::4].copy(), {"subfiletype": 1}), (p, {"subfiletype": 0})),
-    "tiff picture below its thumbnail": lambda p: pages((p[::4, ::4].copy(), {"subfiletype": 1, "subifds": 1}), (p, {})),
+    "tiff picture below its thumbnail": lambda p: pages(
+        (p[::4, ::4].copy(), {"subfiletype": 1, "subifds": 1}), (p, {})
+    ),
     "tiff overviews behind": lambda p: pages((p, {"tile": (16, 16)}), (p[::2, ::2].copy(), {"subfiletype": 1})),
     "tiff mask first": lambda p: pages((p[..., 0] > 100, {"subfiletype": 4}), (p, {})),
     "tiff overviews below": lambda p: pages((p, {"subifds": 1}), (p[::2, ::2].copy(), {"subfiletype": 1})),
     "tiff two pages": lambda p: pages((p, {}), (255 - p, {})),
-}  # fmt: skip
+}
 """Writers of the scene in colours."""
 
 GREY_WAYS: dict[str, Callable[[Array], bytes]] = {
@@ -269,9 +286,11 @@ GREY_WAYS: dict[str, Callable[[Array], bytes]] = {
     "tiff MinIsWhite 16 bit": lambda g: tiff(65535 - deep(g), photometric="miniswhite"),
     "tiff 16 bit gamma 1": lambda g: tiff(deep_in(g, 1.0), iccprofile=grey_profile(1.0)),
     "tiff float with NaN": lambda g: tiff(np.where(g == g.min(), np.nan, g / 255).astype(np.float32)),
-    "tiff grey alpha": lambda g: tiff(with_alpha(g[..., None]), photometric="minisblack", planarconfig="contig", extrasamples=["unassalpha"]),
+    "tiff grey alpha": lambda g: tiff(
+        with_alpha(g[..., None]), photometric="minisblack", planarconfig="contig", extrasamples=["unassalpha"]
+    ),
     "pgm 16 bit": lambda g: pillow_file(deep(g), "PPM"),
-}  # fmt: skip
+}
 """Writers of the scene in greys."""
 
 

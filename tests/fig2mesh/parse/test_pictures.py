@@ -153,9 +153,14 @@ def test_profiles_that_do_not_fit_are_reported(
 
 
 TOLD = {
-    "png iCCP damaged": (lambda: png(scene(), before=chunk(b"iCCP", b"x\0\0nonsense")), "its colour profile is damaged"),
+    "png iCCP damaged": (
+        lambda: png(scene(), before=chunk(b"iCCP", b"x\0\0nonsense")),
+        "its colour profile is damaged",
+    ),
     "png cHRM alone": (
-        lambda: png(scene(), before=chunk(b"cHRM", struct.pack(">8I", *[31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000]))),
+        lambda: png(
+            scene(), before=chunk(b"cHRM", struct.pack(">8I", *[31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000]))
+        ),
         "primaries (cHRM) without gamma are ignored",
     ),
     "png cHRM damaged": (
@@ -168,7 +173,7 @@ TOLD = {
     "tiff 12 of 16 bit": (lambda: WAYS["tiff 12 of 16 bit"](scene()), "4095 is taken for white"),
     "tiff negative": (lambda: scenes.tiff((scene()[..., 0].astype(np.int16) - 90) * 120), "negative ones are black"),
     "tiff bright floats": (lambda: scenes.tiff(scene().astype(np.float32) * 200), "65535 is taken for white"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", TOLD)
