@@ -186,7 +186,8 @@ def vips_file(pixels: NDArray[np.generic], suffix: str, profile: bytes | None = 
     image = pyvips.Image.new_from_array(pixels, interpretation=name[bands])
     if profile is not None:
         image.set_type(pyvips.GValue.blob_type, "icc-profile-data", profile)
-    return bytes(image.write_to_buffer(suffix, **options))
+    # Not the orientation that libvips writes of its own accord.
+    return bytes(image.write_to_buffer(suffix, keep="icc", **options))
 
 
 WAYS: dict[str, Callable[[Array], bytes]] = {
