@@ -14,7 +14,7 @@ from PIL import Image
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.libvips import libvips
 from fig2mesh.parse.samples import of_pillow, of_vips, pillow_only
-from fig2mesh.parse.window import MAX_PIXELS, is_large, read_window, read_window_of, rgba_of, size_of
+from fig2mesh.parse.window import MAX_PIXELS, is_large, read_window_of, rgba_of, size_of
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import PART_NAMES
 from georef.untrusted.damage import DamagedFile
@@ -58,17 +58,10 @@ def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> PictureView
 
     Logs what the picture contradicts itself in, or holds besides. Raises FigureError as `read_figure` does.
     """
-    if bbox is not None and is_large(path):
-        header = read_header(path)
-        width, height = header.size
-        try:
-            pixels, notes = read_window_of(path, header, bbox)
-            _log(path, notes)
-            return PictureView(pixels, bbox[:2], header.size)
-        except FigureError as error:
-            # Pillow decodes some compressions of TIFF that libvips does not.
-            if header.tiff is None or error.source != str(path) or width * height > MAX_PIXELS:
-                raise
+    if bbox is not None and is_large(path) and (part := _window(path, bbox, colours=True)) is not None:
+        pixels, notes, size = part
+        _log(path, notes)
+        return PictureView(pixels, bbox[:2], size)
     rgba, notes = _read(path, "figure", colours=True)
     _log(path, notes)
     height, width = rgba.shape[:2]
@@ -76,6 +69,21 @@ def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> PictureView
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
     return PictureView(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
+
+
+def _window(
+    path: Path, bbox: tuple[int, int, int, int], colours: bool
+) -> tuple[ByteArray, tuple[str, ...], tuple[int, int]] | None:
+    """Pixels of a window, remarks, and the size of the whole; None where it has to be read whole."""
+    header = read_header(path)
+    width, height = header.size
+    try:
+        return *read_window_of(path, header, bbox, colours), header.size
+    except FigureError as error:
+        # Pillow decodes some compressions of TIFF that libvips does not.
+        if header.tiff is None or error.source != str(path) or width * height > MAX_PIXELS:
+            raise
+    return None
 
 
 def _log(path: Path, notes: tuple[str, ...]) -> None:
@@ -114,7 +122,9 @@ def _checked_header(path: Path, what: str) -> PictureHeader:
 
 def _open(path: Path, header: PictureHeader) -> Image.Image:
     """Decode a picture with Pillow, upright. Raises DamagedFile."""
-    image = open_header(path, (header.format,) if header.format != "MPO" else ("JPEG", "MPO"))
+    # Not a TIFF's path, which Pillow would map into memory: it then scrambles the rows of those that are to be turned.
+    source = path if header.tiff is None else path.read_bytes()
+    image = open_header(source, (header.format,) if header.format != "MPO" else ("JPEG", "MPO"))
     check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
     with pillow():
         if header.tiff is not None:
@@ -192,8 +202,10 @@ def _of_view(path: Path, view: PictureView) -> ByteArray | None:
     """Part of another picture in the view's window; None where that picture differs in size from the figure's."""
     if is_large(path) and view.rgba.shape[:2] != view.size[::-1]:
         (x, y), (height, width) = view.corner, view.rgba.shape[:2]
-        whole = size_of(path) == view.size
-        return read_window(path, (x, y, x + width, y + height), colours=False)[0] if whole else None
+        if size_of(path) != view.size:
+            return None
+        if (part := _window(path, (x, y, x + width, y + height), colours=False)) is not None:
+            return part[0]
     values = read_rgba(path, colours=False)
     return values[view.window] if values.shape[:2] == view.size[::-1] else None
 

@@ -160,7 +160,7 @@ def of_vips(path: Path, header: PictureHeader, box: Box | None = None) -> Sample
     image = open_vips(path, header)
     x0, y0, x1, y1 = box or (0, 0, image.width, image.height)
     kind, alpha = _channels(image, header)
-    read = _reader(image, (x0, y0, x1, y1), kind, alpha, invert=header.format == "JPEG" and not header.adobe)
+    read = _reader(image, (x0, y0, x1, y1), kind, alpha)
     if image.interpretation == "labs":
         return Samples(
             (x1 - x0, y1 - y0), "lab", lambda *rows: (read(*rows)[0] * (100 / 32767, 1 / 256, 1 / 256), None)
@@ -211,7 +211,7 @@ def _channels(image: Any, header: PictureHeader) -> tuple[Kind, int | None]:
 
 
 def _reader(
-    image: Any, box: Box, kind: Kind, alpha: int | None, invert: bool = False
+    image: Any, box: Box, kind: Kind, alpha: int | None
 ) -> Callable[[int, int], tuple[NDArray[Any], NDArray[Any] | None]]:
     pyvips = libvips()
     region = pyvips.Region.new(image)
@@ -221,9 +221,7 @@ def _reader(
     def read(top: int, bottom: int) -> tuple[NDArray[Any], NDArray[Any] | None]:
         data = region.fetch(x0, y0 + top, x1 - x0, bottom - top)
         values = np.frombuffer(data, dtype).reshape(bottom - top, x1 - x0, image.bands)
-        colours = values[..., : BANDS[kind]]
-        # Pillow and browsers take every JPEG of CMYK for Adobe's, which is inverted.
-        return 255 - colours if kind == "cmyk" and invert else colours, None if alpha is None else values[..., alpha]
+        return values[..., : BANDS[kind]], None if alpha is None else values[..., alpha]
 
     return read
 

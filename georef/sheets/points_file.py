@@ -9,6 +9,7 @@ https://docs.qgis.org/latest/en/docs/user_manual/working_with_raster/georeferenc
 
 from __future__ import annotations
 
+import csv
 import re
 from pathlib import Path
 
@@ -57,7 +58,11 @@ def read_points_file(path: Path) -> Controls:
     enable = next((header.index(name) for name in ENABLE_NAMES if name in header), None)
     rows, disabled = [], 0
     for number, line in table[1:]:
-        words = _values(line, separator)
+        try:
+            words = [word.strip() for word in next(csv.reader([line], delimiter=separator))]
+        except csv.Error as error:
+            raise PlacementError(path, f"line {number}: {error}", "give four numbers") from None
+        words = words if len(words) <= len(header) else _values(line, separator)
         extra = [word for word in words[len(header) :] if word]
         if extra and not all(re.match(WKT, word) for word in extra):
             finding = f"line {number} has {len(words)} values for {len(header)} columns"

@@ -33,7 +33,7 @@ class PictureHeader:
     orientation : 1 to 8 as in EXIF, 1 is upright
     profile : ICC profile, None without; png, tiff : facts of these formats
     original : width and height that EXIF states, px, which programs that resize a picture tend to leave as they were
-    progressive, adobe : of a JPEG; frames : of an animation
+    frames : of an animation; tags : of a TIFF's page
     notes : remarks of one line each, about what the file contradicts itself in or holds besides
     """
 
@@ -45,8 +45,6 @@ class PictureHeader:
     png: PngFacts | None = None
     tiff: TiffPage | None = None
     original: tuple[int, int] | None = None
-    progressive: bool = False
-    adobe: bool = False
     frames: int = 1
     notes: tuple[str, ...] = ()
     tags: dict[int, Any] = field(default_factory=dict)
@@ -110,8 +108,6 @@ def _header(path: Path, image: Image.Image) -> PictureHeader:
         profile=info.get("icc_profile") or None,
         png=png,
         original=_original_size(exif),
-        progressive="progressive" in info or "progression" in info,
-        adobe="adobe" in info,
         frames=frames,
         notes=tuple(note for note in (contradiction, more) if note),
     )

@@ -56,7 +56,7 @@ def main_page(path: Path) -> TiffPage:
             (index, None, page) for index, page in enumerate(pages) if not _kind(page)
         ]
         if not full:
-            full = [
+            full += [
                 (index, number, below)
                 for index, page in enumerate(pages)
                 for number, below in enumerate(page.pages or () if page.subifds else ())
@@ -75,7 +75,7 @@ def _tifffile(path: Path) -> Iterator[Any]:
     # Its log repeats what is refused or ignored here.
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     try:
-        with tifffile.TiffFile(path, _useframes=False) as file:
+        with tifffile.TiffFile(path) as file:
             yield file
     except DamagedFile:
         raise

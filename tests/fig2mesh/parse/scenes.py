@@ -158,6 +158,15 @@ def pages(*each: tuple[Array, dict[str, object]]) -> bytes:
     return stream.getvalue()
 
 
+def pages_of_labels(labels: Array) -> bytes:
+    """TIFF of part labels behind a thumbnail."""
+    stream = io.BytesIO()
+    with tifffile.TiffWriter(stream) as writer:
+        for pixels, kind in ((labels[::4, ::4].copy(), 1), (labels, 0)):
+            writer.write(pixels, photometric="minisblack", metadata=None, subfiletype=kind)
+    return stream.getvalue()
+
+
 def with_alpha(pixels: Array, value: int = 255) -> Array:
     return np.concatenate([pixels, np.full((*pixels.shape[:2], 1), value, pixels.dtype)], axis=2)
 

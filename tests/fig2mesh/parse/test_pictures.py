@@ -13,7 +13,7 @@ from PIL import Image, ImageCms
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse import window
-from fig2mesh.parse.picture import read_mask, read_rgba, read_view
+from fig2mesh.parse.picture import read_labels, read_mask, read_rgba, read_view
 from fig2mesh.parse.profiles import matrix_profile
 from fig2mesh.parse.window import is_large, read_window, size_of
 from georef.untrusted.picture_header import read_header
@@ -265,6 +265,43 @@ def test_profiles_of_our_own_are_those_of_others() -> None:
     """Display P3 of its primaries against the profile that libvips brings, both read by lcms."""
     made = matrix_profile((0.3127, 0.329, 0.68, 0.32, 0.265, 0.69, 0.15, 0.06), None)
     assert apart(scenes.in_profile(scene(), made), scenes.in_profile(scene(), scenes.P3)) <= 1
+
+
+def test_inks_without_the_marker_of_adobe(tmp_path: Path) -> None:
+    """Pillow and libvips take every JPEG of CMYK for inverted, with the marker and without."""
+    stream = io.BytesIO()
+    inks = Image.fromarray(scenes.in_profile(scene(), scenes.CMYK), "CMYK")
+    inks.save(stream, "JPEG", quality=98, subsampling=0)
+    data = stream.getvalue()
+    start = data.index(b"\xff\xee")
+    (length,) = struct.unpack(">H", data[start + 2 : start + 4])
+    path = write(tmp_path, "jpeg", data[:start] + data[start + 2 + length :])
+    assert apart(read_rgba(path)[..., :3], np.asarray(inks.convert("RGB"))) <= 6
+    assert apart(read_window(path, (0, 0, 48, 36))[0], read_rgba(path)) <= 3
+
+
+@pytest.mark.parametrize("orientation", [1, 2, 3, 6, 7])
+@pytest.mark.parametrize("way", ["png XMP packed", "png raw exif", "tiff tag", "tiff XMP"])
+def test_part_labels_follow_the_same_rule(tmp_path: Path, way: str, orientation: int) -> None:
+    labels = np.zeros((36, 48), np.uint8)
+    labels[:5], labels[20:, 40:] = 3, 7
+    view = read_view(write(tmp_path, "png", png(scene())), None)
+    path = write(tmp_path, way, ORIENTED[way](turned(labels, orientation), orientation))
+    assert np.array_equal(read_labels(path, view), labels)
+    thumbnail_first = scenes.pages_of_labels(labels)
+    assert np.array_equal(read_labels(write(tmp_path, "tiff", thumbnail_first), view), labels)
+
+
+def test_twelve_bits_packed(tmp_path: Path) -> None:
+    grey = scenes.grey_scene()
+    bits = np.unpackbits((grey.astype(np.uint16) * 16).astype(">u2").view(np.uint8).reshape(36, 48, 2), axis=2)
+    data = np.packbits(bits[:, :, 4:].reshape(36, -1), axis=1).tobytes()
+    tags = {256: 48, 257: 36, 258: 12, 259: 1, 262: 1, 273: 8, 277: 1, 278: 36, 279: len(data)}
+    table = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags.items())
+    head = struct.pack("<2sHI", b"II", 42, 8 + len(data)) + data
+    path = write(tmp_path, "tiff", head + struct.pack("<H", len(tags)) + table + bytes(4))
+    assert apart(read_rgba(path)[..., 0], grey) <= 1
+    assert apart(read_view(path, BOX).rgba[..., 0], grey[BOX[1] : BOX[3], BOX[0] : BOX[2]]) <= 1
 
 
 def test_what_cannot_be_decoded_is_no_black_picture(tmp_path: Path) -> None:
