@@ -1,7 +1,8 @@
 """Orientation of a picture, wherever its file may state it.
 
 Sources in the order in which they decide, as browsers, Pillow and the Metadata Working Group's guidelines have it:
-EXIF (its chunk, segment or box; tag 274 of a TIFF), EXIF as text of ImageMagick (`Raw profile type`), XMP.
+the boxes of an AVIF, EXIF (its chunk or segment; tag 274 of a TIFF), EXIF as text of ImageMagick (`Raw profile type`),
+XMP.
 """
 
 from __future__ import annotations

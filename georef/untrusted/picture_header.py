@@ -90,8 +90,11 @@ def _header(path: Path, image: Image.Image) -> PictureHeader:
     exif = info.get("exif") or b""
     if png is None:
         xmp = info.get("xmp") or b""
+        # The boxes of an AVIF decide, also by their absence; Pillow gives what they state as EXIF.
+        boxes = image.format == "AVIF"
+        own = exif_orientation(exif) if exif else None
         stated = [
-            ("EXIF", exif_orientation(exif) if exif else None),
+            ("its boxes", own or 1) if boxes else ("EXIF", own),
             ("XMP", xmp_orientation(xmp.encode() if isinstance(xmp, str) else xmp)),
         ]
     else:
