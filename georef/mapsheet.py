@@ -18,8 +18,9 @@ import numpy as np
 from georef.bearing import normalized_bearing
 from georef.errors import PlacementError
 from georef.geodesy import ecef_from_geodetic, enu_at
+from georef.sheets.agreement import MAX_STRETCH, area_notes, check_controls
 from georef.sheets.controls import Affine, Controls, FloatArray, on_picture
-from georef.sheets.find import OPTION, find_georeference
+from georef.sheets.find import OPTION, SheetFiles, find_georeference
 from georef.sheets.fit import METHODS, Map, fit
 from georef.sheets.hull import convex_hull, nearest_in
 from georef.sheets.quality import FitQuality, distances_m, fit_quality
@@ -121,6 +122,9 @@ class MapSheet:
         notes = []
         if mirrored:
             notes.append(f"{self.file}: at {x:g} {y:g} the map is mirrored; check the control points")
+        stretch = float(scales[0] / scales[1])
+        if stretch > MAX_STRETCH and not self.plane.geographic and self.method in ("given", "affine", "poly1"):
+            notes.append(f"{self.file}: the map is stretched {stretch:.3g} times; check that it is of this picture")
         outside = self._outside(np.array([x, y]), lonlat[:1])
         if outside:
             notes.append(f"{self.file}: {x:g} {y:g} lies {_metres(outside)} outside the control points' hull")
@@ -135,7 +139,7 @@ class MapSheet:
             normalized_bearing(up + 180.0),
             float(np.linalg.norm(down)),
             float(np.linalg.norm(right)),
-            float(scales[0] / scales[1]),
+            stretch,
             mirrored,
             outside,
             tuple(notes),
@@ -161,12 +165,13 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     Raises PlacementError where the georeference is missing, ambiguous, damaged or insufficient.
     """
     found = find_georeference(sheet)
-    notes: list[str] = []
+    notes: list[str] = list(found.notes)
     if isinstance(found.georeference, Affine):
-        return _affine_sheet(found.georeference, found.file, found.picture, found.size, found.crs, transform, map_crs)
+        return _affine_sheet(found.georeference, found, transform, map_crs)
     controls = found.georeference
     if found.size is not None:
         controls = on_picture(controls, found.size, found.file)
+    notes += check_controls(controls, found.size or controls.size, found.file)
     if controls.disabled:
         notes.append(f"{found.file}: {controls.disabled} control points are disabled")
     method = _choose_method(controls, transform, found.file, notes)
@@ -174,6 +179,7 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     fitted = fit(method, controls.pixels, coordinates, found.file)
     quality = fit_quality(fitted, plane, controls.pixels, coordinates)
     given = plane.to_lonlat(coordinates)
+    notes += area_notes(found.file, crs, plane, plane.to_lonlat(coordinates.mean(axis=0)[None]))
     extent = float(distances_m(given, np.broadcast_to(given[:1], given.shape)).max())
     worst = max(quality.rmse_m, quality.leave_one_out_rmse_m or 0.0)
     if worst > MAX_RESIDUAL_SHARE * extent:
@@ -187,29 +193,29 @@ def read_sheet(sheet: Path, *, transform: str = "auto", map_crs: str | None = No
     )
 
 
-def _affine_sheet(
-    affine: Affine,
-    file: Path,
-    picture: Path | None,
-    size: tuple[float, float] | None,
-    named: str | None,
-    transform: str,
-    map_crs: str | None,
-) -> MapSheet:
+def _affine_sheet(affine: Affine, found: SheetFiles, transform: str, map_crs: str | None) -> MapSheet:
+    file, matrix = found.file, affine.matrix
     if transform != "auto":
         finding = f"{file.name} gives the affine map itself, without control points"
         raise PlacementError(f"--map-transform {transform}", finding, "omit --map-transform")
-    notes: list[str] = []
-    crs = _choose_crs(named, map_crs, file, notes)
-    matrix = affine.matrix
+    notes: list[str] = list(found.notes)
+    crs = _choose_crs(found.crs, map_crs, file, notes)
+    plane = plane_of(crs, file)
+
+    def to_plane(points: FloatArray) -> FloatArray:
+        return np.asarray(points @ matrix[:, :2].T + matrix[:, 2])
+
+    with suppress(PlacementError):  # the place itself reports it
+        middle = np.array([found.size or (0.0, 0.0)]) / 2
+        notes += area_notes(file, crs.name, plane, plane.to_lonlat(to_plane(middle)))
     return MapSheet(
         file,
-        picture,
-        size,
+        found.picture,
+        found.size,
         "given",
         crs.name,
-        plane_of(crs, file),
-        lambda points: np.asarray(points @ matrix[:, :2].T + matrix[:, 2]),
+        plane,
+        to_plane,
         np.empty((0, 2)),
         None,
         tuple(notes),

@@ -14,6 +14,8 @@ from fig2mesh.errors import InputError
 from fig2mesh.globe.assets import GlobeAsset
 from fig2mesh.view.cesium import CESIUM
 from fig2mesh.view.template import asset, filled
+from georef.untrusted.damage import DamagedFile
+from georef.untrusted.picture_header import read_header
 
 PACKAGE = "fig2mesh.globe"
 SCRIPTS = ("shows.js", "colours.js", "ground.js", "page.js")
@@ -51,6 +53,12 @@ class Overlay:
             raise InputError("--overlay", f"no such file {self.image}", "check the path")
         if self.image.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp"):
             raise InputError("--overlay", f"{self.image} is not a PNG, JPEG or WebP file", "convert it to PNG or JPEG")
+        try:
+            turned = read_header(self.image).orientation != 1
+        except (DamagedFile, OSError):
+            raise InputError("--overlay", f"{self.image} cannot be read", "give an intact PNG or JPEG") from None
+        if turned:  # browsers turn it, or not, by where the file says so
+            raise InputError("--overlay", f"{self.image} is rotated by its EXIF orientation", "save it upright")
 
 
 def globe_page(assets: tuple[GlobeAsset, ...], overlays: tuple[Overlay, ...] = ()) -> str:

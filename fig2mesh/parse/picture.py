@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image, ImageOps
+from PIL import Image
 
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.window import FORMATS, MAX_PIXELS, is_large, read_window, size_of
+from fig2mesh.parse.libvips import libvips
+from fig2mesh.parse.samples import of_pillow, of_vips, pillow_only
+from fig2mesh.parse.window import MAX_PIXELS, is_large, read_window_of, rgba_of, size_of
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import PART_NAMES
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.image_file import NotAPicture, TooLarge, check_scans, open_header, pillow
+from georef.untrusted.picture_header import PictureHeader, read_header
 
-OPAQUE = np.array([0, 0, 0, 255], np.uint8)
+log = logging.getLogger("fig2mesh")
 
-BAND_PX = 512
-"""Rows converted to RGBA at a time."""
+TURNS = {
+    2: Image.Transpose.FLIP_LEFT_RIGHT,
+    3: Image.Transpose.ROTATE_180,
+    4: Image.Transpose.FLIP_TOP_BOTTOM,
+    5: Image.Transpose.TRANSPOSE,
+    6: Image.Transpose.ROTATE_270,
+    7: Image.Transpose.TRANSVERSE,
+    8: Image.Transpose.ROTATE_90,
+}
+"""Pillow's names of what makes a picture of each EXIF orientation upright."""
 
 
 @dataclass(frozen=True)
@@ -43,36 +56,47 @@ class PictureView:
 def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> PictureView:
     """Read a picture, or the part of it inside `bbox`; of large pictures only that part is kept in memory.
 
-    Raises FigureError as `read_figure` does.
+    Logs what the picture contradicts itself in, or holds besides. Raises FigureError as `read_figure` does.
     """
-    if bbox is None:
-        rgba = read_rgba(path)
-        return PictureView(rgba, (0, 0), (rgba.shape[1], rgba.shape[0]))
-    if is_large(path):
-        pixels, size = read_window(path, bbox)
+    if bbox is not None and is_large(path) and (part := _window(path, bbox, colours=True)) is not None:
+        pixels, notes, size = part
+        _log(path, notes)
         return PictureView(pixels, bbox[:2], size)
-    rgba = read_rgba(path)
+    rgba, notes = _read(path, "figure", colours=True)
+    _log(path, notes)
     height, width = rgba.shape[:2]
-    x0, y0, x1, y1 = bbox
+    x0, y0, x1, y1 = bbox or (0, 0, width, height)
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
     return PictureView(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
 
 
-def _open(path: Path, what: str) -> Image.Image:
-    """Open and decode a picture. Raises FigureError with the reason in one line."""
+def _window(
+    path: Path, bbox: tuple[int, int, int, int], colours: bool
+) -> tuple[ByteArray, tuple[str, ...], tuple[int, int]] | None:
+    """Pixels of a window, remarks, and the size of the whole; None where it has to be read whole."""
+    header = read_header(path)
+    width, height = header.size
+    try:
+        return *read_window_of(path, header, bbox, colours), header.size
+    except FigureError as error:
+        # Pillow decodes some compressions of TIFF that libvips does not.
+        if header.tiff is None or error.source != str(path) or width * height > MAX_PIXELS:
+            raise
+    return None
+
+
+def _log(path: Path, notes: tuple[str, ...]) -> None:
+    for note in notes:
+        log.warning("%s: %s", path, note)
+
+
+@contextmanager
+def _reading(path: Path, what: str) -> Iterator[None]:
+    """Convert the errors of reading a picture to FigureError, with the reason in one line."""
     intact = f"give an intact picture as {what}"
     try:
-        if path.exists() and not path.is_file():  # reading a pipe would block, and a device never ends
-            raise FigureError(path, "cannot be read (not a regular file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
-        image = open_header(path, FORMATS)
-        if image.width * image.height > MAX_PIXELS:
-            raise TooLarge(f"{image.width}×{image.height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx")
-        check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
-        with pillow():
-            image.load()
-            ImageOps.exif_transpose(image, in_place=True)
-        return image
+        yield
     except TooLarge as error:
         raise FigureError(path, str(error), "pass --bbox X0 Y0 X1 Y1 round the figure") from None
     except NotAPicture:
@@ -85,44 +109,71 @@ def _open(path: Path, what: str) -> Image.Image:
         raise FigureError(path, f"cannot be read ({error.strerror})", intact) from None
 
 
-def read_rgba(path: Path) -> ByteArray:
-    """(H, W, 4) uint8 of a picture of any mode, upright. Raises FigureError."""
-    image = _open(path, "figure")
-    try:
-        return _rgba(image)
-    except DamagedFile as error:  # a pixel that names no colour of its palette
-        raise FigureError(path, f"cannot be read ({error})", "give an intact picture as figure") from None
+def _checked_header(path: Path, what: str) -> PictureHeader:
+    """Header of a picture small enough to be decoded whole."""
+    if path.exists() and not path.is_file():  # reading a pipe would block, and a device never ends
+        raise FigureError(path, "cannot be read (not a regular file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
+    header = read_header(path)
+    width, height = header.size
+    if width * height > MAX_PIXELS:
+        raise TooLarge(f"{width}×{height} px is more than {MAX_PIXELS / 1e6:.0f} Mpx")
+    return header
 
 
-def _rgba(image: Image.Image) -> ByteArray:
-    # In bands, as Pillow would keep two more copies of the whole picture meanwhile, and NumPy more of a deep grey one.
-    width, height = image.size
-    bands = [(top, min(top + BAND_PX, height)) for top in range(0, height, BAND_PX)]
-    # 16-bit and float greys: Pillow's own conversion clips instead of scaling.
-    deep = image.mode.startswith(("I", "F"))
-    most = max((float(_grey(image, band).max()) for band in bands), default=0.0) if deep else 0.0
-    factor = 255.0 / (65535.0 if most > 255 else 255.0)
-    steps = np.clip(np.arange(65536) * factor, 0, 255).astype(np.uint8)
-    rgba = np.empty((height, width, 4), np.uint8)
-    for top, bottom in bands:
-        if deep:
-            values = _grey(image, (top, bottom))
-            short = values.dtype.itemsize == 2
-            grey = steps[values] if short else np.clip(values * factor, 0, 255).astype(np.uint8)
-            rgba[top:bottom] = grey[..., None] | OPAQUE
-        else:
-            with pillow():
-                band = image.crop((0, top, width, bottom)).convert("RGBA")
-            rgba[top:bottom] = np.asarray(band)
-    return rgba
+def _open(path: Path, header: PictureHeader) -> Image.Image:
+    """Decode a picture with Pillow, upright. Raises DamagedFile."""
+    # Not a TIFF's path, which Pillow would map into memory: it then scrambles the rows of those that are to be turned.
+    source = path if header.tiff is None else path.read_bytes()
+    image = open_header(source, (header.format,) if header.format != "MPO" else ("JPEG", "MPO"))
+    check_scans(image, path.read_bytes() if "progressive" in image.info else b"")
+    with pillow():
+        if header.tiff is not None:
+            if header.tiff.subifd is not None:
+                raise DamagedFile("its picture is below its thumbnail")
+            image.seek(header.tiff.index)
+        image.load()
+        # Pillow turns a TIFF itself when it decodes it.
+        turn = None if header.tiff is not None else TURNS.get(header.orientation)
+        return image if turn is None else image.transpose(turn)
 
 
-def _grey(image: Image.Image, band: tuple[int, int]) -> NDArray[np.uint16 | np.float64]:
-    """Rows of a picture of one deep channel; NaN becomes 0."""
-    rows = np.asarray(image.crop((0, band[0], image.width, band[1])))
-    if rows.dtype.itemsize == 2:
-        return rows.astype(np.uint16)
-    return np.nan_to_num(rows.astype(np.float64), nan=0.0)
+def read_rgba(path: Path, colours: bool = True) -> ByteArray:
+    """(H, W, 4) uint8 of a picture of any mode, upright.
+
+    colours : convert them to sRGB by the picture's profile; not for masks, whose numbers are no colours
+    Raises FigureError.
+    """
+    return _read(path, "figure", colours)[0]
+
+
+def _read(path: Path, what: str, colours: bool) -> tuple[ByteArray, tuple[str, ...]]:
+    """(H, W, 4) uint8 of a picture, and remarks about it. Raises FigureError."""
+    with _reading(path, what):
+        header = _checked_header(path, what)
+        return _rgba(path, header, colours)
+
+
+def _rgba(path: Path, header: PictureHeader, colours: bool) -> tuple[ByteArray, tuple[str, ...]]:
+    # libvips reads more kinds of TIFF than Pillow, and 16 bits of colours.
+    deep = header.png is not None and header.png.bits == 16
+    if deep or (header.tiff is not None and not pillow_only(header)):
+        error = libvips().Error
+        try:
+            rgba, notes = rgba_of(of_vips(path, header), header, colours)
+            return upright(rgba, header.orientation), notes
+        except error as problem:
+            if deep:
+                raise DamagedFile(str(problem).strip().split("\n")[0][:100]) from None
+    return rgba_of(of_pillow(_open(path, header)), header, colours)
+
+
+def upright(pixels: ByteArray, orientation: int) -> ByteArray:
+    """(H, W, …) picture turned and mirrored as its EXIF orientation asks for."""
+    if orientation >= 5:
+        pixels = pixels.swapaxes(0, 1)
+    rows = -1 if orientation in (3, 4, 7, 8) else 1
+    columns = -1 if orientation in (2, 3, 6, 7) else 1
+    return np.ascontiguousarray(pixels[::rows, ::columns])
 
 
 def read_mask(path: Path | None, view: PictureView) -> BoolArray | None:
@@ -135,7 +186,7 @@ def read_mask(path: Path | None, view: PictureView) -> BoolArray | None:
         return None if opaque.all() else np.asarray(opaque)
     values = _of_view(path, view)
     if values is None:
-        values = read_rgba(path)
+        values = read_rgba(path, colours=False)
         if values.shape != view.rgba.shape:
             width, height = view.size
             found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
@@ -151,15 +202,18 @@ def _of_view(path: Path, view: PictureView) -> ByteArray | None:
     """Part of another picture in the view's window; None where that picture differs in size from the figure's."""
     if is_large(path) and view.rgba.shape[:2] != view.size[::-1]:
         (x, y), (height, width) = view.corner, view.rgba.shape[:2]
-        whole = size_of(path) == view.size
-        return read_window(path, (x, y, x + width, y + height))[0] if whole else None
-    values = read_rgba(path)
+        if size_of(path) != view.size:
+            return None
+        if (part := _window(path, (x, y, x + width, y + height), colours=False)) is not None:
+            return part[0]
+    values = read_rgba(path, colours=False)
     return values[view.window] if values.shape[:2] == view.size[::-1] else None
 
 
 def read_labels(path: Path, view: PictureView) -> ByteArray:
     """(H, W) uint8 part labels from a file. Raises FigureError."""
-    image = _open(path, "part labels")
+    with _reading(path, "part labels"):
+        image = _open(path, _checked_header(path, "part labels"))
     if image.mode not in ("L", "P"):
         raise FigureError(path, f"mode {image.mode}", "give an 8-bit single-channel or palette picture of labels")
     labels = np.asarray(image, np.uint8)

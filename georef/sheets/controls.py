@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -83,17 +84,30 @@ def on_picture(controls: Controls, size: tuple[int, int], source: Path) -> Contr
         # The sides of a scaled picture are rounded to whole pixels, so its aspect ratio may be off by one pixel.
         factor = np.array(size) / np.array(controls.size)
         if abs(factor[0] / factor[1] - 1) > 1.0 / min(size) + 1.0 / min(controls.size):
-            finding = f"made for a picture of {_text(controls.size)} px, but the sheet has {_text(size)} px"
+            finding = f"made for a picture of {size_text(controls.size)} px, but the sheet has {size_text(size)} px"
             raise PlacementError(source, finding, "give the whole picture it was made for, at any resolution")
         controls = replace(controls, pixels=controls.pixels * factor, size=(float(size[0]), float(size[1])))
     away = (controls.pixels < -np.array(size)) | (controls.pixels > 2 * np.array(size))
     if away.any(axis=1).mean() > 0.5:
-        finding = f"most control points lie far outside the sheet of {_text(size)} px"
+        finding = f"most control points lie far outside the sheet of {size_text(size)} px"
+        finding += seeming_size(controls.pixels, np.array(size, np.float64))
         raise PlacementError(source, finding, "give points in pixels of this picture")
     return controls
 
 
-def _text(size: tuple[float, float]) -> str:
+def seeming_size(pixels: FloatArray, sides: FloatArray) -> str:
+    """Remark about the picture that points seem to be made for: the sheet times the least whole number that holds them.
+
+    pixels : (N, 2); sides : (2,) of the sheet, px
+    """
+    factor = float(np.ceil((pixels / sides).max() - 0.02))
+    if (pixels < -0.5 * sides).any() or not 2 <= factor <= 20:
+        return ""
+    return f", as if made for a picture of about {size_text(sides * factor)} px"
+
+
+def size_text(size: Sequence[float] | FloatArray) -> str:
+    """Width and height for messages."""
     return f"{size[0]:g}×{size[1]:g}"
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from georef.errors import PlacementError
+from georef.sheets.agreement import picture_notes, same_map
 from georef.sheets.annotation import is_annotation, read_annotation
 from georef.sheets.controls import Affine, Controls
 from georef.sheets.pictures import SUFFIXES, SheetPicture, read_picture
@@ -27,6 +26,7 @@ class SheetFiles:
     picture : the sheet's picture, None where there is only a georeference; size : of the picture, px
     file : the file that the georeference was read from
     georeference : control points or an affine map; crs : reference system named in any of the files
+    notes : remarks about the picture and the files beside it, one line each
     """
 
     picture: Path | None
@@ -34,6 +34,7 @@ class SheetFiles:
     file: Path
     georeference: Affine | Controls
     crs: str | None
+    notes: tuple[str, ...] = ()
 
 
 def find_georeference(sheet: Path) -> SheetFiles:
@@ -46,6 +47,16 @@ def find_georeference(sheet: Path) -> SheetFiles:
     """
     if not sheet.is_file():
         raise PlacementError(f"{OPTION} {sheet}", "no such file", "give the sheet's picture or its georeference")
+    found, facts = _found(sheet)
+    if facts is None or found.picture is None:
+        return found
+    own = [f"{found.picture}: {note}" for note in facts.notes]
+    more = picture_notes(found.picture, facts.size, facts.original, found.georeference)
+    return replace(found, notes=(*own, *more))
+
+
+def _found(sheet: Path) -> tuple[SheetFiles, SheetPicture | None]:
+    """Files of a sheet, and the header of its picture."""
     kind = _kind(sheet)
     if kind == "picture":
         return _of_picture(sheet)
@@ -53,7 +64,7 @@ def find_georeference(sheet: Path) -> SheetFiles:
     facts = None if picture is None else read_picture(picture)
     georeference = _read(sheet, kind)
     crs = georeference.crs or _prj_beside(sheet, picture) or (facts.crs if facts is not None else None)
-    return SheetFiles(picture, None if facts is None else facts.size, sheet, georeference, crs)
+    return SheetFiles(picture, None if facts is None else facts.size, sheet, georeference, crs), facts
 
 
 def _kind(path: Path) -> str:
@@ -76,7 +87,7 @@ def _read(path: Path, kind: str) -> Affine | Controls:
     return read_points_file(path) if kind == "points" else read_annotation(path)
 
 
-def _of_picture(sheet: Path) -> SheetFiles:
+def _of_picture(sheet: Path) -> tuple[SheetFiles, SheetPicture]:
     facts = read_picture(sheet)
     world = _present(sheet, _world_suffixes(sheet.suffix))
     points = _present(sheet, (".points",))
@@ -86,7 +97,8 @@ def _of_picture(sheet: Path) -> SheetFiles:
         # Programs write world files next to GeoTIFFs; one that equals the tags is not a second candidate.
         candidates = [path for path in candidates if path not in world or not _same_map(facts, read_world_file(path))]
         if not candidates:
-            return SheetFiles(sheet, facts.size, sheet, facts.georeference, facts.crs or _prj_beside(sheet, sheet))
+            crs = facts.crs or _prj_beside(sheet, sheet)
+            return SheetFiles(sheet, facts.size, sheet, facts.georeference, crs), facts
         candidates = [sheet, *candidates]
     if not candidates:
         tried = ", ".join(dict.fromkeys(sheet.stem + s for s in (*_world_suffixes(sheet.suffix), ".points", ".json")))
@@ -99,7 +111,7 @@ def _of_picture(sheet: Path) -> SheetFiles:
     file = candidates[0]
     georeference = _read(file, _kind(file))
     crs = georeference.crs or _prj_beside(file, sheet) or facts.crs
-    return SheetFiles(sheet, facts.size, file, georeference, crs)
+    return SheetFiles(sheet, facts.size, file, georeference, crs), facts
 
 
 def _world_suffixes(suffix: str) -> tuple[str, ...]:
@@ -139,10 +151,5 @@ def _prj_beside(file: Path, picture: Path | None) -> str | None:
 
 
 def _same_map(facts: SheetPicture, world: Affine) -> bool:
-    if not isinstance(facts.georeference, Affine):
-        return False
-    inner, other = facts.georeference.matrix, world.matrix
-    width, height = facts.size
-    corners = np.array([[0, 0, 1], [width, 0, 1], [0, height, 1], [width, height, 1]], np.float64)
-    apart = corners @ (inner - other).T
-    return bool(np.abs(np.linalg.solve(inner[:, :2], apart.T)).max() < SAME_MAP_TOLERANCE_PX)
+    own = facts.georeference
+    return isinstance(own, Affine) and same_map(own.matrix, world.matrix, facts.size, SAME_MAP_TOLERANCE_PX)

@@ -1,12 +1,11 @@
-"""Headers of picture files, read without decoding: size, and the GeoTIFF tags of a TIFF.
+"""Pictures of sheets, read without decoding: size, and the GeoTIFF tags of a TIFF.
 
 https://docs.ogc.org/is/19-008r4/19-008r4.html
 """
 
 from __future__ import annotations
 
-import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -16,15 +15,16 @@ import numpy as np
 from georef.errors import PlacementError
 from georef.sheets.controls import MAX_POINTS, Affine, Controls, make_controls
 from georef.untrusted.damage import DamagedFile, decoding
+from georef.untrusted.image_file import NotAPicture
+from georef.untrusted.picture_header import read_header
 
-SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".jp2", ".gif", ".bmp")
+SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".avif", ".jp2", ".gif", ".bmp")
 
 PIXEL_SCALE, TIEPOINTS, TRANSFORMATION = 33550, 33922, 34264
 GEO_KEYS, GEO_DOUBLES, GEO_ASCII = 34735, 34736, 34737
 MODEL_TYPE, RASTER_TYPE, GEODETIC_CRS, PROJECTED_CRS = 1024, 1025, 2048, 3072
 CITATIONS = (3073, 2049, 1026)
 POINT, GEOGRAPHIC, USER_DEFINED = 2, 2, 32767
-ORIENTATION = 274
 ESRI = "ESRI PE String ="
 
 
@@ -34,76 +34,44 @@ class SheetPicture:
 
     size : width and height, px; georeference : from its tags, None without them
     crs : as in `Controls`, also where the tags give only the reference system
+    original : width and height that EXIF states, px; None without
+    notes : remarks about the file, one line each
     """
 
     size: tuple[int, int]
     georeference: Affine | Controls | None = None
     crs: str | None = None
+    original: tuple[int, int] | None = None
+    notes: tuple[str, ...] = ()
 
 
 def read_picture(path: Path) -> SheetPicture:
     """Read size and tags of a picture of any size without decoding it.
 
-    Raises PlacementError for files that are not pictures, have broken tags, or are rotated by their EXIF orientation,
+    Raises PlacementError for files that are not pictures, have broken tags, or are rotated by their orientation,
     since georeferences refer to pixels as stored.
     """
-    # The plugins of the formats above register themselves; `Image.init` would import thirty more.
-    from PIL import Image, Jpeg2KImagePlugin, TiffImagePlugin, WebPImagePlugin  # noqa: F401
-
-    Image.preinit()
     try:
-        with path.open("rb") as file, warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            head = file.read(16)
-            file.seek(0)
-            # Not Image.open, which rejects large pictures although only the header is needed.
-            for factory, accept in Image.OPEN.values():
-                accepted = accept is None or accept(head)
-                if accepted and not isinstance(accepted, str):
-                    try:
-                        image = factory(file, str(path))
-                        break
-                    except (SyntaxError, IndexError, TypeError, KeyError, EOFError, ValueError, OSError):
-                        file.seek(0)
-            else:
-                raise PlacementError(path, "not a readable picture", "give a PNG, JPEG, TIFF or WebP as the sheet")
-            size = (int(image.size[0]), int(image.size[1]))
-            tags = dict(getattr(image, "tag_v2", None) or {})
-            orientation = orientation_of(image)
-    except PlacementError:
-        raise
+        header = read_header(path)
+    except NotAPicture:
+        raise PlacementError(path, "not a readable picture", "give a PNG, JPEG, TIFF or WebP as the sheet") from None
     except FileNotFoundError:
         raise PlacementError(path, "no such file", "check the path of the sheet") from None
-    except Exception as error:
-        # Parsers raise all kinds of exceptions for damaged headers.
-        reason = getattr(error, "strerror", None) or type(error).__name__
+    except (DamagedFile, OSError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
         raise PlacementError(path, f"cannot be read ({reason})", "give an intact picture") from None
-    if orientation not in (0, 1):
+    if header.orientation != 1:
         raise PlacementError(
             path, "rotated by its EXIF orientation", "save it upright; georeferences refer to stored pixels"
         )
+    size, tags = header.size, header.tags
     if not any(tag in tags for tag in (PIXEL_SCALE, TIEPOINTS, TRANSFORMATION, GEO_KEYS)):
-        return SheetPicture(size)
+        return SheetPicture(size, None, None, header.original, header.notes)
     try:
-        return _georeferenced(path, size, tags)
+        found = _georeferenced(path, size, tags)
     except DamagedFile:
         raise PlacementError(path, "its GeoTIFF tags are damaged", "give an intact GeoTIFF, or a world file") from None
-
-
-def orientation_of(image: Any) -> int:
-    """EXIF orientation from a picture's header; 1, upright, where it has none.
-
-    image : as Pillow opened it. Its own `getexif` decodes a whole PNG, since EXIF data may also be at the end.
-    """
-    if image.format != "PNG":
-        return int(image.getexif().get(ORIENTATION, 1))
-    if not image.info.get("exif"):
-        return 1
-    from PIL.Image import Exif
-
-    exif = Exif()
-    exif.load(image.info["exif"])
-    return int(exif.get(ORIENTATION, 1))
+    return replace(found, notes=header.notes)
 
 
 def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> SheetPicture:

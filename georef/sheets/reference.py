@@ -6,7 +6,7 @@ Every conversion excludes pyproj's ballpark transformations: where no accurate o
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +41,7 @@ class Plane:
     from_lonlat : the inverse
     accuracy_m : accuracy of the transformation, known only after use; None: exact, or unknown
     geographic : coordinates are angles
+    area : west, south, east, north of the area that its reference system is for, degrees; None: anywhere, or unknown
     """
 
     name: str
@@ -48,6 +49,7 @@ class Plane:
     from_lonlat: Callable[[FloatArray], FloatArray]
     accuracy_m: Callable[[], float | None]
     geographic: bool = False
+    area: tuple[float, float, float, float] | None = None
 
 
 def crs_of(text: str, source: object = OPTION) -> CRS:
@@ -91,7 +93,9 @@ def plane_of(crs: CRS, source: object = OPTION) -> Plane:
     except ProjError:
         finding = f"no transformation from {crs.name} to WGS 84 is known"
         raise PlacementError(source, finding, "give a reference system that pyproj can transform to WGS 84") from None
-    return _plane(crs.name, transformer, crs.is_geographic, source)
+    area = crs.area_of_use
+    bounds = None if area is None else (area.west, area.south, area.east, area.north)
+    return replace(_plane(crs.name, transformer, crs.is_geographic, source), area=bounds)
 
 
 def fitting_plane(crs: CRS, source: object = OPTION) -> Plane:

@@ -73,6 +73,39 @@ def open_header(source: bytes | Path, formats: tuple[str, ...] = FORMATS) -> Ima
         return Image.open(io.BytesIO(source) if isinstance(source, bytes) else source, formats=formats)
 
 
+@contextmanager
+def open_any_size(path: Path, formats: tuple[str, ...]) -> Iterator[Image.Image]:
+    """Open a picture of any number of pixels, reading only its header; `Image.open` refuses large ones.
+
+    Raises NotAPicture for files in none of `formats`, DamagedFile for a damaged header.
+    """
+    # The plugins register themselves; `Image.init` would import thirty more.
+    from PIL import AvifImagePlugin, Image, Jpeg2KImagePlugin, TiffImagePlugin, WebPImagePlugin  # noqa: F401
+
+    Image.preinit()
+    with path.open("rb") as file:
+        head = file.read(16)
+        reason: Exception | None = None
+        for name in formats:
+            factory, accept = Image.OPEN[name]
+            accepted = accept is None or accept(head)
+            if not accepted or isinstance(accepted, str):
+                continue
+            file.seek(0)
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    image = factory(file, str(path))
+            except Exception as error:  # parsers raise all kinds of exceptions for damaged headers
+                reason = error
+                continue
+            yield image
+            return
+    if reason is None:
+        raise NotAPicture("not a readable picture")
+    raise DamagedFile(f"damaged picture ({reason_of(reason, 80)})")
+
+
 def picture_size(data: bytes) -> tuple[int, int]:
     """Width and height of a picture. Raises DamagedFile."""
     with open_header(data) as image:

@@ -15,6 +15,7 @@ from fig2mesh.errors import InputError
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import Overlay, globe_page, page_files
 from tests.exporters.analytic import ZURICH, asset, capsule
+from tests.fig2mesh.parse import scenes
 
 
 @pytest.fixture
@@ -136,6 +137,20 @@ def test_overlays_need_a_rectangle(tmp_path: Path, edges: tuple[float, float, fl
     (tmp_path / "map.png").write_bytes(b"")
     with pytest.raises(InputError, match="--overlay"):
         Overlay(tmp_path / "map.png", *edges)
+
+
+def test_overlays_that_are_to_be_turned_are_refused(tmp_path: Path) -> None:
+    """Browsers turn a picture by its EXIF data, and not by XMP."""
+    path = tmp_path / "map.png"
+    for chunks in (scenes.chunk(b"eXIf", scenes.exif(6)[6:]), scenes.itxt(scenes.xmp(3))):
+        path.write_bytes(scenes.png(scenes.scene(), before=chunks))
+        with pytest.raises(InputError, match="rotated by its EXIF orientation; save it upright"):
+            Overlay(path, 8, 47, 9, 48)
+    path.write_bytes(scenes.png(scenes.scene()))
+    assert Overlay(path, 8, 47, 9, 48).image == path
+    path.write_bytes(b"no picture")
+    with pytest.raises(InputError, match="cannot be read"):
+        Overlay(path, 8, 47, 9, 48)
 
 
 def test_the_page_closes_no_script_early_and_names_no_server(tmp_path: Path, figure: Path) -> None:
