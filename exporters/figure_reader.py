@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from exporters.errors import ExportError
 from exporters.georeference import placement_of_record
 from exporters.gltf.reader import Gltf, open_glb
-from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
+from exporters.level_error import monotone_errors
+from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, vector
 from exporters.tiles.b3dm import part_table
 from georef.geodesy import tile_from_asset
 from georef.untrusted.damage import DamagedFile
