@@ -93,6 +93,7 @@ def asset(placement: GeoPlacement | None = None, **changes: Any) -> Asset:
         "placement": placement,
         "part_names": PART_NAMES,
         "copyright": "© Zürich map, CC BY 4.0",
+        "observed_pixels": True,
         "metadata": {"source": "farmer.png", "seed": 7},
     }
     return Asset(**(fields | changes))

@@ -19,12 +19,12 @@ from exporters.gltf.glb import glb_bytes, write_glb
 from exporters.gltf.ktx2 import padded
 from exporters.gltf.reader import Gltf, glb_of
 from exporters.inspect import inspect
+from exporters.level_error import MAX_SCREEN_SPACE_ERROR_PX
 from exporters.placed_figure import figure_of
 from exporters.profiles import profile_named
 from exporters.sampling import sample
 from exporters.solid import measure_topology, unmatched_edges
 from exporters.tiles.b3dm import read_b3dm
-from exporters.level_error import MAX_SCREEN_SPACE_ERROR_PX
 from exporters.tiles.tileset import with_visible_outlines
 from exporters.validate import validate
 from exporters.write import write

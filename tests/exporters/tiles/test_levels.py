@@ -47,8 +47,8 @@ def selected(document: dict[str, Any], distance: float, limit: float = 16.0) -> 
 
     if covers(document["geometricError"]) <= limit:
         return None
-    chain = [tile for tile in _levels(document["root"])]
-    return next(tile for tile in chain if "content" in tile and covers(tile["geometricError"]) <= limit)
+    tiles = (tile for tile in _levels(document["root"]) if "content" in tile)
+    return next(tile for tile in tiles if covers(tile["geometricError"]) <= limit)
 
 
 def _documents(given: Asset) -> dict[str, dict[str, Any]]:
