@@ -24,6 +24,7 @@ from exporters.validate import validate
 from fig2mesh.render.model import read_model
 from tests.exporters.analytic import EXACT_VOLUME, HEIGHT, ZURICH, asset, capsule
 from tests.exporters.outlined import hulled
+from tests.node import RunScript
 
 Document = dict[str, Any]
 
@@ -162,6 +163,17 @@ def test_a_mesh_that_is_not_decoded_has_the_size_that_the_file_states(tmp_path: 
     write_figures([path], tmp_path / "tiles")
     with pytest.raises(ExportError, match="draco"):
         read_model(path)
+
+
+def test_gltf_transform_drops_what_it_does_not_know(tmp_path: Path, codec_tools: RunScript) -> None:
+    given = _rewritten(tmp_path, lambda document: None)
+    codec_tools("decompress_gltf.mjs", given, tmp_path / "b.glb")
+    before, after = inspect(given), inspect(tmp_path / "b.glb")
+    assert {key: before[key] for key in ("triangles", "watertight", "placement")} == {
+        key: after[key] for key in ("triangles", "watertight", "placement")
+    }
+    assert not [each for each in validate(tmp_path / "b.glb", external=False) if each.severity == "error"]
+    assert read_figure(tmp_path / "b.glb").placement == read_figure(given).placement
 
 
 def _places(value: Any, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:

@@ -33,6 +33,8 @@ STATE = """(async () => {
     ground: [...document.querySelectorAll('dd')].map((each) => each.textContent) };
 })()"""
 
+WITHOUT_PANEL = "document.getElementById('panel').style.display = 'none'"
+
 FLY = "fig2mesh.look(fig2mesh.figures.find((figure) => figure.name === {name!r}), 0)"
 
 
@@ -57,7 +59,7 @@ def seen(look: Look, cesium: Path, path: Path, *actions: dict[str, Any]) -> list
     """Results of actions on the page of a model, the panels put away for the pictures."""
     assets = find_assets((path,))
     with serving(page_server(globe_page(assets), 0, {"cesium": cesium}, page_files(assets))) as address:
-        found = look(address, {"evaluate": "document.getElementById('panel').style.display = 'none'"}, *actions, size=(SIZE, SIZE))
+        found = look(address, {"evaluate": WITHOUT_PANEL}, *actions, size=(SIZE, SIZE))
     assert found["messages"] == []
     return [each.get("value", each.get("png")) for each in found["results"][1:]]
 
