@@ -24,7 +24,7 @@ from exporters.validate import validate
 from fig2mesh.render.model import read_model
 from tests.exporters.analytic import EXACT_VOLUME, HEIGHT, ZURICH, asset, capsule
 from tests.exporters.outlined import hulled
-from tests.node import RunScript
+from tests.node import runner
 
 Document = dict[str, Any]
 
@@ -165,9 +165,9 @@ def test_a_mesh_that_is_not_decoded_has_the_size_that_the_file_states(tmp_path: 
         read_model(path)
 
 
-def test_gltf_transform_drops_what_it_does_not_know(tmp_path: Path, codec_tools: RunScript) -> None:
+def test_gltf_transform_drops_what_it_does_not_know(tmp_path: Path, codecs: Path) -> None:
     given = _rewritten(tmp_path, lambda document: None)
-    codec_tools("decompress_gltf.mjs", given, tmp_path / "b.glb")
+    runner(codecs)("decompress_gltf.mjs", given, tmp_path / "b.glb")
     before, after = inspect(given), inspect(tmp_path / "b.glb")
     assert {key: before[key] for key in ("triangles", "watertight", "placement")} == {
         key: after[key] for key in ("triangles", "watertight", "placement")
