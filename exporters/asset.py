@@ -191,6 +191,8 @@ class Asset:
     part_names : label → name for the labels that occur in `TexturedMesh.parts`
     copyright : attribution line, may be empty
     lit : True: clients shade the surface; False: they show its colours unlit, in formats that support it
+    observed_pixels : write the mask of observed texels as well, in formats that support it; the share of each part that
+        it gives is always written. Some clients (loaders.gl) read such a texture once per vertex, for minutes
     metadata : JSON-serialisable facts about the figure (source, seed, version, observed share ...)
 
     Texts are made representable in UTF-8, see `exporters.text`.
@@ -202,6 +204,7 @@ class Asset:
     part_names: dict[int, str] = field(default_factory=dict)
     copyright: str = ""
     lit: bool = False
+    observed_pixels: bool = False
     metadata: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

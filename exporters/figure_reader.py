@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 from collections.abc import Iterator
@@ -16,7 +15,9 @@ from numpy.typing import NDArray
 from exporters.errors import ExportError
 from exporters.georeference import placement_of_record
 from exporters.gltf.reader import Gltf, open_glb
-from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, monotone_errors, vector
+from exporters.gltf.stated import stated_corners
+from exporters.level_error import monotone_errors
+from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, vector
 from exporters.tiles.b3dm import part_table
 from georef.geodesy import tile_from_asset
 from georef.untrusted.damage import DamagedFile
@@ -24,13 +25,6 @@ from georef.untrusted.json_shape import NUMBER, Numbers, Required, check_shape
 
 SAME_PLACE_M = 1e-3
 """Tolerance between a tile's transform and the place recorded in its content: the accuracy that fig2mesh guarantees."""
-
-INTEGER_SCALES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
-
-CORNER_ENDS = np.array(list(itertools.product((0, 1), repeat=3)))
-"""(8, 3): for each corner of a box, which of its two ends along each axis."""
-
-Box = NDArray[np.float64]
 
 
 def read_figures(path: Path) -> Iterator[PlacedFigure]:
@@ -68,7 +62,7 @@ def read_figure(path: Path) -> PlacedFigure:
         raise ExportError(path, "has no place on the earth", "make it with --lonlat LON LAT")
     try:
         placement = placement_of_record(record)
-        low, high = _bounds(gltf)
+        corners = tile_from_asset().apply(stated_corners(gltf))
         table = part_table(gltf)
         shares = table.get("observedShare", [])
         if not all(isinstance(share, float) for share in shares):
@@ -77,8 +71,8 @@ def read_figure(path: Path) -> PlacedFigure:
         return PlacedFigure(
             name=next((str(node["name"]) for node in gltf.items("nodes") if node.get("name")), path.stem),
             placement=placement,
-            low=vector(low),
-            high=vector(high),
+            low=vector(corners.min(axis=0)),
+            high=vector(corners.max(axis=0)),
             contents=(os.path.abspath(path),),
             errors=(0.0,),
             source=str(metadata.get("source", "")) if isinstance(metadata, dict) else "",
@@ -91,44 +85,17 @@ def read_figure(path: Path) -> PlacedFigure:
         raise ExportError(path, f"broken glTF ({error})", "run fig2mesh validate") from error
 
 
-def _bounds(gltf: Gltf) -> tuple[Box, Box]:
-    """Corners, in the TILE frame, of a box round all meshes of the scene, outlines included.
-
-    From the accessors' min and max, which glTF requires, so compressed files need not be decompressed.
-    """
-    corners = []
-    for mesh, matrix in gltf.instances():
-        for primitive in gltf.primitives(mesh):
-            if "POSITION" not in primitive["attributes"]:
-                raise DamagedFile(f"meshes/{mesh} has no positions")
-            accessor = gltf.item("accessors", primitive["attributes"]["POSITION"])
-            if len(accessor.get("min", ())) != 3 or len(accessor.get("max", ())) != 3:
-                raise DamagedFile(f"the positions of meshes/{mesh} have no min and max")
-            ends = np.array([accessor["min"], accessor["max"]], dtype=np.float64)
-            if accessor.get("normalized"):
-                if accessor["componentType"] not in INTEGER_SCALES:
-                    raise DamagedFile(f"normalised positions of componentType {accessor['componentType']}")
-                ends = np.maximum(ends / INTEGER_SCALES[accessor["componentType"]], -1.0)
-            corners.append(ends[CORNER_ENDS, [0, 1, 2]] @ matrix[:3, :3].T + matrix[:3, 3])
-    if not corners:
-        raise DamagedFile("no mesh in the scene")
-    points = tile_from_asset().apply(np.concatenate(corners))
-    if not np.isfinite(points).all():
-        raise DamagedFile("vertices are not finite")
-    return points.min(axis=0), points.max(axis=0)
-
-
 def _observed(gltf: Gltf, shares: NDArray[np.float64]) -> float | None:
-    """Share of the surface area that is observed in the drawing; None where the mesh is compressed."""
+    """Share of the surface area that is observed in the drawing; None where it is compressed or split."""
     used = gltf.document.get("extensionsUsed", [])
-    if len(gltf.items("meshes")) - len(gltf.outlines) != 1 or any(
-        "compression" in each or "quantization" in each for each in used
-    ):
+    solids = [mesh for mesh in range(len(gltf.items("meshes"))) if mesh not in gltf.outlines]
+    if len(solids) != 1 or any("compression" in each or "quantization" in each for each in used):
         return None
-    if not gltf.primitives(0) or "_FEATURE_ID_0" not in gltf.primitives(0)[0]["attributes"]:
-        raise DamagedFile("vertices have no part")
-    positions, faces = gltf.mesh_arrays()
-    ids = gltf.accessor(gltf.primitives(0)[0]["attributes"]["_FEATURE_ID_0"])
+    primitives = gltf.primitives(solids[0])
+    if len(primitives) != 1 or "_FEATURE_ID_0" not in primitives[0]["attributes"]:
+        return None
+    positions, faces = gltf.mesh_arrays(solids[0])
+    ids = gltf.accessor(primitives[0]["attributes"]["_FEATURE_ID_0"])
     if ids.shape != (len(positions),) or not ((ids >= 0) & (ids < len(shares))).all():
         raise DamagedFile("the vertices' parts are not in the property table")
     rows = ids.astype(np.int64)

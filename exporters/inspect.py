@@ -24,7 +24,7 @@ FACTS = {
 KEYS = (
     "format", "files", "name", "copyright", "generator", "vertices", "triangles", "bounds_m", "size_m", "watertight",
     "solid", "components", "genus", "volume_m3", "outline", "texture_px", "parts", "observed", "placement",
-    "lods", "metadata",
+    "lods", "metadata", "notes",
 )
 # fmt: on
 
@@ -37,7 +37,7 @@ def inspect(path: str | os.PathLike[str]) -> dict[str, Any]:
         the frame of the file, size_m, watertight, solid, components, genus, volume_m3, outline (form and triangles of
         the drawn contour, which only bounds_m and size_m also count), texture_px [width, height],
         parts, observed (part → observed share of its surface), placement (lon_deg, lat_deg, height_m, heading_deg and
-        any further recorded values), lods, metadata
+        any further recorded values), lods, metadata, notes (what is missing or damaged, a line each)
 
     Raises ExportError for files that cannot be read.
     """

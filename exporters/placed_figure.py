@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from exporters.asset import Asset
 from exporters.errors import ExportError
+from exporters.level_error import level_errors
 from exporters.sampling import face_parts, observed_shares
 from exporters.text import plain_text
 from georef.geodesy import ecef_from_tile, tile_from_asset
@@ -35,7 +36,7 @@ class PlacedFigure:
     low, high : corners of the box round all levels of detail and their outlines, TILE frame, metres
     contents : one file per level of detail, finest first: paths with slashes, relative to the tileset's folder, or
         their paths before they are copied there
-    errors : per level, the largest distance to the finest surface, metres; the first is 0
+    errors : per level, the geometric error of its tile, metres; the first is 0
     source : the picture it was made from, "" if unknown
     copyright : attribution line, may be empty
     parts : names of its body parts
@@ -95,7 +96,7 @@ def _plain(name: str, value: Any) -> Value:
 def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
     """Return the record of an asset in memory.
 
-    asset : with a placement; `deviation_m` of its levels becomes the errors
+    asset : with a placement; for the errors see `exporters.level_error`
     contents : paths of its levels of detail, existing or to be written, finest first
 
     Raises ExportError for an asset without a placement.
@@ -114,7 +115,7 @@ def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
         low=vector(vertices.min(axis=0)),
         high=vector(vertices.max(axis=0)),
         contents=contents,
-        errors=monotone_errors([0.0, *(mesh.deviation_m[1] for mesh in asset.lods[1:])]),
+        errors=level_errors(asset.lods),
         source=str(asset.metadata.get("source", "")),
         copyright=asset.copyright,
         parts=tuple(asset.part_names.get(label, f"part_{label}") for label in labels),
@@ -147,8 +148,3 @@ def vector(values: NDArray[np.float64]) -> Vector:
     """Convert an array of three numbers to a tuple of Python floats."""
     x, y, z = values.tolist()
     return (x, y, z)
-
-
-def monotone_errors(errors: list[float]) -> tuple[float, ...]:
-    """Make the errors of levels, finest first, non-decreasing, as tiles need them to be refined."""
-    return tuple(np.maximum.accumulate(errors).tolist())

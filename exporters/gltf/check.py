@@ -105,6 +105,8 @@ def _check_document(gltf: Gltf, own: bool) -> Iterator[Finding]:
             )
             break
         pixels += yield from _check_image(gltf, index, f"{name}: images/{index}")
+    for note in gltf.lost:
+        yield Finding("warning", "LOST_EXTENSION", note, name)
     yield from _check_property_tables(gltf)
     yield from _check_property_textures(gltf)
 

@@ -30,7 +30,7 @@ from exporters.gltf.material import linear_rgba, material, texture_file
 from exporters.gltf.meshopt import quantised, quantised_uv, reordered
 from exporters.gltf.outline import OUTLINE, outline_mesh
 from exporters.gltf.part_borders import split_at_parts
-from exporters.gltf.part_features import evidence, features, manifold
+from exporters.gltf.part_features import features, manifold, observed_texels
 from exporters.profiles import GENERAL, Profile
 from exporters.solid import unit_normals
 
@@ -104,7 +104,7 @@ def _build(asset: Asset, lod: int, profile: Profile) -> tuple[Document, Texture 
     if profile.extensions:
         if mesh.parts is not None:
             primitive["extensions"] = {"EXT_mesh_features": features(document, asset, mesh, attributes)}
-            shown = evidence(document, mesh)
+            shown = observed_texels(document, mesh) if asset.observed_pixels else None
             if shown is not None:
                 primitive["extensions"]["EXT_structural_metadata"] = shown
     elif mesh.parts is not None:

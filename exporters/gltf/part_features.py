@@ -62,7 +62,7 @@ def features(document: Document, asset: Asset, mesh: TexturedMesh, attributes: d
     return {"featureIds": [{"featureCount": len(labels), "attribute": 0, "propertyTable": 0, "label": "part"}]}
 
 
-def evidence(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
+def observed_texels(document: Document, mesh: TexturedMesh) -> dict[str, Any] | None:
     """Add EXT_structural_metadata of a primitive with a mask of observed texels: a property texture `observed`, 1 where
     the drawing shows the surface and 0 where it is inferred, in the texture coordinates of the colours.
 

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from exporters.errors import ExportError
 from exporters.gltf import meshopt
 from exporters.gltf.container import Bytes, mapped, split_glb
+from exporters.gltf.lost import drop_lost
 from exporters.gltf.outline import outline_form
-from exporters.gltf.shape import DOCUMENT, MESHOPT
+from exporters.gltf.shape import DOCUMENT, MESHOPT, RTC
 from exporters.solid import merged_by_position
 from georef.untrusted.damage import DamagedFile, decoding
 from georef.untrusted.json_file import parse_json, read_bytes
@@ -45,13 +46,19 @@ class NotDecoded(DamagedFile):
     """Valid data in a form that is not decoded here, or whose decoder is not installed."""
 
 
+class Compressed(NotDecoded):
+    """Compressed data without a decoder here."""
+
+
 @dataclass(frozen=True)
 class Gltf:
-    """A glTF file: `document`, the JSON; `buffers`, the bytes; `path`, its source."""
+    """A glTF file: `document`, the JSON; `buffers`, the bytes; `path`, its source; `lost`, notes about extensions that
+    are not read because they point nowhere, see `exporters.gltf.lost`."""
 
     document: dict[str, Any]
     buffers: tuple[bytes, ...]
     path: Path
+    lost: tuple[str, ...] = ()
     _count_read: list[int] = field(default_factory=lambda: [0], compare=False, repr=False)
 
     def items(self, kind: str) -> list[dict[str, Any]]:
@@ -111,7 +118,7 @@ class Gltf:
                 try:
                     return meshopt.decode(self._span(packed, index), packed)
                 except ExportError as error:
-                    raise NotDecoded(f"bufferView {index}: {error.finding}; {error.remedy}") from error
+                    raise Compressed(f"bufferView {index}: {error.finding}; {error.remedy}") from error
         return self._span(view, index)
 
     def _span(self, view: dict[str, Any], index: int) -> bytes:
@@ -212,7 +219,7 @@ class Gltf:
     def _positions(self, primitive: dict[str, Any]) -> NDArray[Any]:
         """Positions (V, 3), empty if a primitive has none."""
         if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-            raise NotDecoded("compressed with Draco")
+            raise Compressed("compressed with Draco")
         if "POSITION" not in primitive["attributes"]:
             return np.empty((0, 3), np.float32)
         return self.vectors(primitive["attributes"]["POSITION"], 3)
@@ -428,6 +435,8 @@ def glb_of(data: Bytes, path: Path) -> Gltf:
 def _gltf(text: Bytes, binary: Bytes | None, path: Path) -> Gltf:
     document = parse_json(text)
     check_shape(document, DOCUMENT)
+    lost = drop_lost(document)
+    check_shape(document.get("extensions", {}), RTC, "/extensions")
     buffers = []
     for index, item in enumerate(document.get("buffers", [])):
         if "uri" not in item and any(item.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT):
@@ -437,4 +446,4 @@ def _gltf(text: Bytes, binary: Bytes | None, path: Path) -> Gltf:
         if data is None or len(data) < item["byteLength"]:
             raise DamagedFile(f"buffer {index} has {len(data or b'')} bytes, expected {item['byteLength']}")
         buffers.append(cast(bytes, data))
-    return Gltf(document, tuple(buffers), path)
+    return Gltf(document, tuple(buffers), path, lost)

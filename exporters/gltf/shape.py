@@ -1,6 +1,7 @@
 """Shape of glTF documents, which `exporters.gltf.reader` checks before using them.
 
-Only members that are used here are included; the Khronos validator checks all rules. Extras may be anything.
+Only members that are used here are included; the Khronos validator checks all rules. Extras may be anything. The
+extensions of figures are checked apart, by `exporters.gltf.lost`: a file is also read without them.
 
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html#properties-reference
 """
@@ -40,22 +41,33 @@ _PRIMITIVE = {
     "indices": INDEX,
     "material": INDEX,
     "mode": INDEX,
-    "extensions": {"EXT_mesh_features": {"featureIds": [_FEATURE_IDS]}},
 }
 
-_MANIFOLD = {
+FEATURES = {"featureIds": [_FEATURE_IDS]}
+"""EXT_mesh_features of a primitive."""
+
+MANIFOLD = {
     "manifoldPrimitive": Required({"indices": Required(INDEX), "attributes": Required(Values(INDEX))}),
+    "mergeIndices": INDEX,
+    "mergeValues": INDEX,
 }
+
+"""EXT_mesh_manifold of a mesh."""
 
 _COLUMN = {"values": Required(INDEX), "stringOffsets": INDEX, "arrayOffsets": INDEX}
 
-_STRUCTURAL_METADATA = {
+TABLE_METADATA = {
     "schema": {
         "classes": Values({"properties": Values({"type": Required(str), "componentType": str, "array": bool})}),
     },
     "propertyTables": [{"class": Required(str), "count": Required(INDEX), "properties": Values(_COLUMN)}],
     "propertyTextures": [{"class": Required(str), "properties": Values({"index": INDEX})}],
 }
+
+"""EXT_structural_metadata of a document."""
+
+SURFACE_METADATA = {"propertyTextures": [INDEX]}
+"""EXT_structural_metadata of a primitive."""
 
 _TARGET = {"node": INDEX, "path": Required(str)}
 
@@ -77,7 +89,7 @@ DOCUMENT: dict[str, Any] = {
             "scale": Numbers(3),
         }
     ],
-    "meshes": [{"primitives": Required([_PRIMITIVE]), "extensions": {"EXT_mesh_manifold": _MANIFOLD}}],
+    "meshes": [{"primitives": Required([_PRIMITIVE])}],
     "accessors": [_ACCESSOR],
     "bufferViews": [_SPAN | {"extensions": dict.fromkeys(MESHOPT, _PACKED)}],
     "buffers": [
@@ -97,5 +109,7 @@ DOCUMENT: dict[str, Any] = {
             "samplers": Required([{"input": Required(INDEX), "output": Required(INDEX), "interpolation": str}]),
         }
     ],
-    "extensions": {"EXT_structural_metadata": _STRUCTURAL_METADATA, "CESIUM_RTC": {"center": Required(Numbers(3))}},
 }
+
+RTC = {"CESIUM_RTC": {"center": Required(Numbers(3))}}
+"""Extensions of the document without which its vertices are elsewhere."""

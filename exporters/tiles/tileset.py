@@ -25,6 +25,7 @@ from exporters.asset import Asset, TexturedMesh, without_outline
 from exporters.errors import ExportError
 from exporters.georeference import georeference
 from exporters.gltf.glb import glb_bytes
+from exporters.level_error import MAX_SCREEN_SPACE_ERROR_PX, level_errors
 from exporters.placed_figure import PlacedFigure, ecef_matrix, figure_of
 from exporters.profiles import GENERAL, Profile
 from exporters.tiles.b3dm import b3dm_bytes
@@ -33,9 +34,6 @@ TilesVersion = Literal["1.0", "1.1"]
 
 CONTENT_SUFFIXES: dict[TilesVersion, str] = {"1.0": ".b3dm", "1.1": ".glb"}
 """Suffix of content files, by version of 3D Tiles."""
-
-MAX_SCREEN_SPACE_ERROR_PX = 16
-"""Default maximumScreenSpaceError of CesiumJS: a tile is refined where its geometric error covers more pixels."""
 
 MIN_VISIBLE_HEIGHTS = 10.0
 """Warning threshold of the visible range, in heights of the figure: below it, the figure vanishes while still large."""
@@ -70,7 +68,7 @@ def write_tileset(
 ) -> None:
     """Write a figure as a tileset.
 
-    asset : a placed asset; `deviation_m` of its levels of detail becomes the tiles' geometric errors
+    asset : a placed asset; for the errors of its levels of detail see `exporters.level_error`
     path : a folder, created if missing, or the tileset.json in one; files of the same names are replaced
     visible_from_m : distance up to which the figure is drawn, on a screen of 1080 rows; None: `visible_range`
     version : of 3D Tiles
@@ -104,11 +102,12 @@ def with_visible_outlines(asset: Asset) -> Asset:
     sixteenth of its error is the smallest pixel. The finest level, which is also shown from nearby, keeps its outline.
     """
 
-    def visible(mesh: TexturedMesh) -> TexturedMesh:
-        wide = mesh.outline is not None and mesh.outline.width_m >= mesh.deviation_m[1] / MAX_SCREEN_SPACE_ERROR_PX
+    def visible(mesh: TexturedMesh, error: float) -> TexturedMesh:
+        wide = mesh.outline is not None and mesh.outline.width_m >= error / MAX_SCREEN_SPACE_ERROR_PX
         return mesh if wide else without_outline(mesh)
 
-    return replace(asset, lods=(asset.lods[0], *(visible(mesh) for mesh in asset.lods[1:])))
+    errors = level_errors(asset.lods)
+    return replace(asset, lods=tuple(map(visible, asset.lods, errors)))
 
 
 def tileset(asset: Asset, visible_from_m: float | None = None, version: TilesVersion = "1.1") -> dict[str, Any]:
@@ -200,7 +199,6 @@ def figure_tile(figure: PlacedFigure, facts: dict[str, Any] | None = None) -> di
     volume = {"box": [value + 0.0 for value in box]}
     tile: dict[str, Any] = {}
     for uri, error in zip(figure.contents, figure.errors, strict=True):
-        # A tile's error is the deviation of its mesh from the finest one.
         children = {"children": [tile]} if tile else {}
         content = {"content": {"uri": quote(uri)}}
         tile = {"boundingVolume": volume, "geometricError": error, **(facts or {}), **content, **children}

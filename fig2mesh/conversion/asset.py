@@ -19,7 +19,7 @@ def asset_of(
     request: Request, name: str, levels: tuple[TexturedMesh, ...], settings: Settings, placed: Placed
 ) -> Asset:
     """The asset of a request; levels : result of the stage `model`."""
-    if not request.evidence:
+    if request.evidence == "none":
         levels = tuple(replace(level, parts=None, observed=None) for level in levels)
     facts = {
         "source": request.figure.name,
@@ -34,9 +34,10 @@ def asset_of(
         name=name,
         lods=levels,
         placement=placed.placement,
-        part_names=_part_names(levels) if request.evidence else {},
+        part_names=_part_names(levels) if request.evidence != "none" else {},
         copyright=request.credit,
         lit=settings.light,
+        observed_pixels=request.evidence == "pixels",
         metadata={**facts, **placed.metadata},
     )
 

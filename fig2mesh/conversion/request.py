@@ -21,6 +21,7 @@ Effect = Literal["light", "none"]
 MapTransform = Literal["auto", "helmert", "affine", "poly1", "poly2", "poly3", "tps", "projective"]
 ProfileName = Literal["cesiumjs", "cesiumjs-ktx2", "blender", "qgis", "omniverse"]
 Device = Literal["auto", "cpu", "cuda"]
+Evidence = Literal["parts", "pixels", "none"]
 
 
 @request_class
@@ -216,8 +217,10 @@ class OutputOptions:
         default="1.1", column=False, help="Version of 3D Tiles. 1.0: content as .b3dm, for older clients."
     )
     credit: str = option(default="", metavar="TEXT", help="Attribution to store in the outputs.")
-    evidence: bool = option(
-        default=True, help="Store part names, and the share of each part that the drawing shows, as glTF feature ids."
+    evidence: Evidence = option(
+        default="parts",
+        help="How to store what the drawing shows: parts for part names and the share of each part, as glTF feature "
+        "ids; pixels for a mask of the texture as well, which some clients are slow to read; none.",
     )
     save_stages: Path | None = option(
         default=None, metavar="DIR", column=False, help="Save the result of each stage in DIR."

@@ -17,8 +17,12 @@ function drawGrid(lines, feet, size) {
   const ecefFromEnu = Transforms.eastNorthUpToFixedFrame(feet);
   const at = (x, y) => Matrix4.multiplyByPoint(ecefFromEnu, new Cartesian3(x, y, 0), new Cartesian3());
   lines.removeAll();
+  // In pieces: along a line that passes beside the camera, depth is not interpolated well enough, and what stands in
+  // front of it is painted over.
+  const PIECES = 100;
   const add = (offset, reach, width, colour) => {
-    for (const positions of [[at(offset, -reach), at(offset, reach)], [at(-reach, offset), at(reach, offset)]]) {
+    const along = Array.from({ length: PIECES + 1 }, (_, i) => reach * ((2 * i) / PIECES - 1));
+    for (const positions of [along.map((value) => at(offset, value)), along.map((value) => at(value, offset))]) {
       lines.add({ positions, width, material: Material.fromType('Color', { color: colour }) });
     }
   };

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import logging
 import shutil
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from exporters.atomic_file import atomic_folder
 from fig2mesh.errors import OutputError
 from fig2mesh.globe.assets import find_assets
+from fig2mesh.globe.drape import drape
 from fig2mesh.globe.page import Overlay, globe_page, page_files
 from fig2mesh.globe.request import GlobeRequest
 from fig2mesh.terminal import print_outputs
@@ -35,12 +37,15 @@ def run(
         _check_folder(output, request.overwrite)
     laid = tuple(Overlay(Path(image), *edges) for image, *edges in overlays)
     found = find_assets(tuple(assets))
-    page, files = globe_page(found, laid), page_files(found, laid)
     built = find_cesium(request.cesium, "globe")
-    if output is None:
-        show(page_server(page, request.port, {CESIUM: built}, files), request.open)
-        return
-    write_folder(output, page, files, built)
+    with tempfile.TemporaryDirectory(prefix="fig2mesh_") as folder:
+        if request.map is not None:
+            laid = (drape(request.map, request.map_crs, Path(folder), "sheet"), *laid)
+        page, files = globe_page(found, laid), page_files(found, laid)
+        if output is None:
+            show(page_server(page, request.port, {CESIUM: built}, files), request.open)
+            return
+        write_folder(output, page, files, built)
     size = sum(file.stat().st_size for file in output.rglob("*") if file.is_file())
     log.info("a page of %.0f MB; serve it, for instance: python -m http.server -d %s", size / 1e6, output)
     print_outputs(output)

@@ -4,6 +4,7 @@
 const MOST_LISTED = 300;
 const PITCH = -8; // degrees; a little from above
 const AWAY = 3.2; // radii of a figure between it and the camera
+const HOME_AWAY = [2.2, 1.7, 1.3]; // radii of all figures between their middle and the camera
 const CLEAR = 1.2; // radii at which the camera is still outside of it
 const DRAWN_PX = 16; // CesiumJS draws a figure while the geometric error above it covers more
 
@@ -46,7 +47,7 @@ async function start() {
       style: Cesium.LabelStyle.FILL_AND_OUTLINE, outlineWidth: 3, outlineColor: Cesium.Color.BLACK,
       horizontalOrigin: Cesium.HorizontalOrigin.CENTER, pixelOffset: new Cesium.Cartesian2(0, -8),
       // Where the figure itself is too small to be seen.
-      distanceDisplayCondition: new Cesium.DistanceDisplayCondition(60 * Math.max(radius, 1), Number.MAX_VALUE),
+      distanceDisplayCondition: new Cesium.DistanceDisplayCondition(60 * radius, Number.MAX_VALUE),
     });
   }
 
@@ -56,10 +57,16 @@ async function start() {
     find('figures').replaceChildren(...matching.slice(0, MOST_LISTED).map((figure) => {
       const button = make('button', figure.name, { type: 'button', onclick: () => look(figure) });
       button.setAttribute('aria-current', String(figure === state.current));
+      button.classList.toggle('far', tooFar(figure));
       const item = make('li', '');
       item.append(button);
       return item;
     }));
+    const far = figures.filter(tooFar);
+    find('undrawn').hidden = far.length === 0;
+    find('undrawn').textContent = far.length === figures.length && far.length > 1
+      ? `none of ${far.length} figures is drawn from here; click a name to fly there`
+      : `not drawn from here: ${far.slice(0, 5).map((figure) => figure.name).join(', ')}${far.length > 5 ? ` and ${far.length - 5} more` : ''}; click a name to fly there`;
     find('filter').hidden = figures.length <= 12;
     find('more').hidden = matching.length <= MOST_LISTED;
     find('more').textContent = `and ${matching.length - MOST_LISTED} more; search by name`;
@@ -76,6 +83,12 @@ async function start() {
     camera.lookAtTransform(Transforms.eastNorthUpToFixedFrame(figure.sphere().center), offset);
     state.locked = true;
     scene.requestRender();
+  }
+
+  // Figures of a centimetre are looked at from a few: the camera must come that near, and see what is that near.
+  function setNear(distance) {
+    camera.frustum.near = Math.min(0.1, distance / 20);
+    scene.screenSpaceCameraController.minimumZoomDistance = Math.min(1, distance / 10);
   }
 
   function setGround(height) {
@@ -109,6 +122,7 @@ async function start() {
     const sphere = figure.sphere();
     const towards = Angle.toRadians((place?.heading_deg ?? 180) + 180);
     const offset = new HeadingPitchRange(towards, Angle.toRadians(PITCH), awayFor(figure, sphere.radius));
+    setNear(offset.range);
     find('scale').textContent = '';
     if (place) {
       const step = drawGrid(lines, place.feet, figure.size);
@@ -123,6 +137,7 @@ async function start() {
     await drawn(figure);
     if (state.current !== (figure.real ?? figure)) return;
     describe(state.current);
+    list();
     paintFigure(state.current);
   }
 
@@ -147,17 +162,32 @@ async function start() {
     const alike = figures[0].place()?.heading_deg ?? 180;
     const same = figures.every((figure) => Math.abs(((figure.place()?.heading_deg ?? 180) - alike + 540) % 360 - 180) < 45);
     const pitch = all.radius > 1e6 ? -90 : -25;
-    const offset = new HeadingPitchRange(Angle.toRadians(same ? alike + 180 : 0), Angle.toRadians(pitch), 2.2 * all.radius);
     if (all.radius < 1e6) setGround(Math.min(...figures.map((figure) => figure.ground)));
+    // From nearer where that shows more of the figures.
+    const views = HOME_AWAY.map((radii) => {
+      const offset = new HeadingPitchRange(Angle.toRadians(same ? alike + 180 : 0), Angle.toRadians(pitch), radii * all.radius);
+      camera.viewBoundingSphere(all, offset);
+      camera.lookAtTransform(Matrix4.IDENTITY);
+      return { offset, far: figures.filter(tooFar).length };
+    });
+    const { offset } = views.reduce((best, view) => (view.far < best.far ? view : best));
+    setNear(offset.range);
     camera.viewBoundingSphere(all, offset);
     camera.lookAtTransform(Matrix4.IDENTITY);
+    list();
     scene.requestRender();
   }
 
   const row = (term, value) => (value === undefined || value === null || value === '' ? [] : [make('dt', term), make('dd', String(value))]);
   // Said above in other words.
   const SHOWN = /^(heading|heading_deg|longitude|latitude|height|height_m|parts|partsObservedShare)$/;
-  const plain = (value) => (typeof value === 'object' && value !== null ? JSON.stringify(value) : value);
+  const plain = (value) => {
+    if (typeof value === 'number') return Number(value.toPrecision(7));
+    if (Array.isArray(value)) return value.map(plain).join(', ');
+    if (typeof value !== 'object' || value === null) return value;
+    return Object.entries(value).filter(([, each]) => each !== null && each !== '').map(([key, each]) => `${key.replaceAll('_', ' ')} ${plain(each)}`).join('; ');
+  };
+  const fixed = (value) => (Math.abs(value) < 0.005 ? 0 : value).toFixed(2); // not -0.00
 
   function describe(figure) {
     const place = figure.place();
@@ -168,9 +198,9 @@ async function start() {
       ...row('source', plain(source)), ...row('credit', figure.credit),
       ...(place ? [
         ...row('place', `${angle(place.lat_deg, 'N', 'S')}, ${angle(place.lon_deg, 'E', 'W')}`),
-        ...row('ground', `${place.height_m.toFixed(2)} m`), ...row('facing', `${place.heading_deg.toFixed(2)}°`),
+        ...row('ground', `${fixed(place.height_m)} m`), ...row('facing', `${fixed(place.heading_deg)}°`),
       ] : []),
-      ...row('height', figure.size >= 1000 ? `${(figure.size / 1000).toFixed(2)} km` : `${figure.size.toFixed(2)} m`),
+      ...row('height', figure.size >= 1000 ? `${(figure.size / 1000).toFixed(2)} km` : figure.size < 0.1 ? `${Number((1000 * figure.size).toPrecision(3))} mm` : `${figure.size.toFixed(2)} m`),
       ...Object.entries(rest).filter(([key]) => !SHOWN.test(key)).slice(0, 12).flatMap(([key, value]) => row(key, String(plain(value)).slice(0, 120))),
     );
     const names = [...new Set(figure.features().map((feature) => feature.getProperty('name')).filter((name) => name !== undefined))];
@@ -196,7 +226,7 @@ async function start() {
     const level = figure?.shownLevel() ?? -1;
     const found = figure?.levels[level];
     const triangles = found?.triangles === undefined ? '' : `, ${found.triangles.toLocaleString('en')} triangles`;
-    const error = found?.error ? `at most ${(1000 * found.error).toPrecision(3)} mm off` : 'the finest mesh';
+    const error = found?.error ? `for pixels of ${((1000 * found.error) / DRAWN_PX).toPrecision(3)} mm and more` : 'the finest mesh';
     const text = found ? `shown: LOD ${level}, ${error}${triangles}` : '';
     if (find('level').textContent !== text) find('level').textContent = text;
   }
@@ -319,7 +349,15 @@ async function start() {
   for (const credit of new Set(credits)) viewer.creditDisplay.addStaticCredit(new Cesium.Credit(make('b', credit).innerHTML, true));
   window.fig2mesh = { viewer, figures, state, look, home, drawn, setLevel, setMode, setGrid, choosePart, at, ecefFromMesh, placeOf };
   if (figures.length === 1) await look(figures[0], 0);
-  else if (figures.length) { home(); state.current = figures[0]; describe(figures[0]); }
+  else if (figures.length) {
+    home();
+    state.current = figures[0];
+    describe(figures[0]);
+    // Nothing to be seen of figures far apart: better one of them.
+    if (figures.every(tooFar)) await look(figures[0], 0);
+  }
+  camera.moveEnd.addEventListener(list);
+  list();
   document.documentElement.dataset.ready = 'true';
 }
 

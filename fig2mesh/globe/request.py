@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fig2mesh.conversion.fields import check_fields, option, request_class
+from fig2mesh.errors import InputError
 
 
 @request_class
@@ -22,6 +23,17 @@ class GlobeRequest:
         metavar="DIR",
         help="Folder of the npm package cesium. Default: node_modules/cesium in the current folder or a parent.",
     )
+    map: Path | None = option(
+        default=None,
+        metavar="SHEET",
+        help="Drape a georeferenced map sheet over the ground, such as the one that the figures come from: its picture "
+        "with a world file, GeoTIFF tags or control points, as for the main job.",
+    )
+    map_crs: str | None = option(
+        default=None,
+        metavar="CRS",
+        help="Coordinate reference system of the sheet, such as EPSG:2056, if its files name none.",
+    )
     port: int = option(
         default=0, low=0, high=65535, metavar="N", default_text="a free one", help="Port of the local web server."
     )
@@ -30,3 +42,5 @@ class GlobeRequest:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.map_crs is not None and self.map is None:
+            raise InputError("--map-crs", "there is no sheet", "give --map SHEET with it")

@@ -162,7 +162,7 @@ def _mesh_scene(path: Path, request: PictureRequest) -> MeshScene:
     if request.mode == "textured" and mesh.texture is None and mesh.colors is None:
         raise FigureError(path, "has no colours", "use --mode clay")
     if request.mode == "parts" and mesh.parts is None:
-        raise FigureError(path, "has no part labels", "use a GLB made without --no-evidence")
+        raise FigureError(path, "has no part labels", "use a GLB made with --evidence parts")
     return MeshScene(mesh if request.mode == "textured" else without_outline(mesh))
 
 

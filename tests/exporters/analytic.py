@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -92,9 +93,17 @@ def asset(placement: GeoPlacement | None = None, **changes: Any) -> Asset:
         "placement": placement,
         "part_names": PART_NAMES,
         "copyright": "© Zürich map, CC BY 4.0",
+        "observed_pixels": True,
         "metadata": {"source": "farmer.png", "seed": 7},
     }
     return Asset(**(fields | changes))
+
+
+def shrinking(texels: int = 64) -> tuple[TexturedMesh, ...]:
+    """The levels of `asset`, with textures of `texels`, a half and a quarter of them, as figures have."""
+    sizes = (texels, texels // 2, texels // 4)
+    textures = [{"texture": gradient_texture(size), "observed": half_observed(size)} for size in sizes]
+    return tuple(replace(mesh, **more) for mesh, more in zip(asset().lods, textures, strict=True))
 
 
 ZURICH = GeoPlacement(8.5417, 47.3769, 455.34, "egm96", 135.0)

@@ -12,6 +12,7 @@ import pytest
 
 from exporters.asset import Asset
 from exporters.gltf.part_borders import split_at_parts
+from exporters.level_error import level_errors
 from exporters.placed_figure import PlacedFigure
 from exporters.tiles.gather import write_figures
 from exporters.tiles.tileset import write_tileset
@@ -24,7 +25,7 @@ from georef.geodesy import ecef_from_geodetic, ecef_from_tile
 from georef.placement import GeoPlacement
 from tests import py3dtiles
 from tests.browser import Look, serving
-from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule
+from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule, shrinking
 from tests.exporters.test_clients import HEADINGS, PLACES
 from tests.exporters.tiles.test_tree import crowd, mixed
 from tests.node import RunScript
@@ -173,11 +174,11 @@ def test_the_globe_flies_into_a_short_range_or_reports_that_nothing_is_drawn(
 
 
 def test_levels_of_detail_follow_their_errors_in_cesium(tmp_path: Path, node: RunScript) -> None:
-    given = asset(ZURICH)
+    given = asset(ZURICH, lods=shrinking())
     write_tileset(given, tmp_path, visible_from_m=2000.0)
     write(given, tmp_path / "in")
     write_figures([tmp_path / "in"], tmp_path / "many")
-    errors = [mesh.deviation_m[1] for mesh in given.lods]
+    errors = level_errors(given.lods)
     # Just within and beyond the distances at which each level's error is 16 pixels, above the head; and the whole.
     ranges = [103.923 * errors[1], 103.923 * errors[2], 2000.0]
     heights = [distance + change for distance in ranges for change in (-0.01, 0.01)]

@@ -9,6 +9,7 @@ import pytest
 
 from exporters.errors import ExportError
 from exporters.inspect import inspect
+from exporters.level_error import level_errors
 from exporters.tiles.gather import write_figures
 from exporters.write import FORMATS, write
 from georef.placement import GeoPlacement
@@ -46,7 +47,7 @@ def test_levels_of_detail_of_a_tileset(tmp_path: Path) -> None:
     lods = inspect(tmp_path)["lods"]
     assert [lod["uri"] for lod in lods] == ["farmer.glb", "farmer_lod1.glb", "farmer_lod2.glb"]
     assert [lod["triangles"] for lod in lods] == [len(mesh.faces) for mesh in asset().lods]
-    assert [lod["geometric_error_m"] for lod in lods] == [mesh.deviation_m[1] for mesh in asset().lods]
+    assert [lod["geometric_error_m"] for lod in lods] == list(level_errors(asset().lods))
 
 
 @pytest.mark.parametrize("name", ["a.usda", "a.usdc", "a.usdz"])

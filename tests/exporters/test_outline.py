@@ -19,12 +19,13 @@ from exporters.gltf.glb import glb_bytes, write_glb
 from exporters.gltf.ktx2 import padded
 from exporters.gltf.reader import Gltf, glb_of
 from exporters.inspect import inspect
+from exporters.level_error import MAX_SCREEN_SPACE_ERROR_PX
 from exporters.placed_figure import figure_of
 from exporters.profiles import profile_named
 from exporters.sampling import sample
 from exporters.solid import measure_topology, unmatched_edges
 from exporters.tiles.b3dm import read_b3dm
-from exporters.tiles.tileset import MAX_SCREEN_SPACE_ERROR_PX, with_visible_outlines
+from exporters.tiles.tileset import with_visible_outlines
 from exporters.validate import validate
 from exporters.write import write
 from fig2mesh.measure.model import load_textured
@@ -268,7 +269,10 @@ def test_without_outline_is_the_mesh_before_the_inset() -> None:
 def test_levels_whose_pixels_are_wider_than_the_line_have_no_outline() -> None:
     line = 0.01
     error = line * MAX_SCREEN_SPACE_ERROR_PX
-    levels = tuple(hulled(capsule(deviation_m=(0.0, each)), line) for each in (2 * error, 0.99 * error, 1.01 * error))
+    fine = gradient_texture(512)  # its texels are narrower than the line
+    levels = tuple(
+        hulled(capsule(deviation_m=(0.0, each), texture=fine), line) for each in (2 * error, 0.99 * error, 1.01 * error)
+    )
     found = with_visible_outlines(asset(ZURICH, lods=levels)).lods
     assert [mesh.outline is not None for mesh in found] == [True, True, False]
     assert np.array_equal(found[2].vertices, capsule().vertices)

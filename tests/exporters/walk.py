@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,9 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+
+from exporters.gltf.reader import read_gltf
+from exporters.texture_files import texture_size
 
 
 @dataclass(frozen=True)
@@ -61,3 +65,14 @@ def outside(points: np.ndarray, centre: np.ndarray, axes: np.ndarray) -> float:
     length = np.linalg.norm(axes, axis=1)
     along = (points - centre) @ (axes / length[:, None]).T
     return float((np.abs(along) - length).max())
+
+
+def property_texels(path: Path) -> int:
+    """Number of texels in the property textures of a glTF file."""
+    gltf = read_gltf(path)
+    textures = [
+        gltf.item("textures", each["index"])
+        for holder in gltf.extension("EXT_structural_metadata").get("propertyTextures", [])
+        for each in holder["properties"].values()
+    ]
+    return sum(math.prod(texture_size(gltf.image(texture["source"]))) for texture in textures)

@@ -17,7 +17,7 @@ from tests.fuzz.seeds import STEM, Input, alone
 TABLE: list[dict[str, Any]] = [
     {"figure": f"{STEM}.csv", "name": "Anna", "lon": 8.5, "lat": 47.25, "triangles": 4000, "artist": "=1+1"},
     {"figure": "b.png", "name": "Böb, \"the\" second\nline", "lon": -8.0, "lat": 1e-9, "altitude": 400.0},
-    {"figure": "../c.png", "lon": 8.0, "lat": 47.0, "bbox": "1 2 30 40", "evidence": "no", "date": "1893"},
+    {"figure": "../c.png", "lon": 8.0, "lat": 47.0, "bbox": "1 2 30 40", "evidence": "none", "date": "1893"},
 ]
 # fmt: on
 

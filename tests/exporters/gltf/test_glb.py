@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,13 @@ from exporters.errors import ExportError
 from exporters.gltf.glb import glb_bytes, write_glb, write_gltf
 from exporters.gltf.part_borders import split_at_parts
 from exporters.gltf.reader import read_gltf
+from exporters.inspect import inspect
+from exporters.profiles import profile_named
 from exporters.sampling import face_parts
 from exporters.validate import validate
+from exporters.write import write
 from tests.exporters.analytic import ZURICH, asset, capsule, half_observed
+from tests.exporters.walk import property_texels
 from tests.node import RunScript
 
 COLORS = np.tile(np.array([[255, 128, 0]], np.uint8), (len(capsule().vertices), 1))
@@ -105,6 +110,19 @@ def test_document_has_the_facts_of_the_asset(tmp_path: Path) -> None:
     assert (position.min, position.max) == (vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist())
     indices = gltf.accessors[gltf.meshes[0].primitives[0].indices]
     assert indices.componentType == pygltflib.UNSIGNED_SHORT
+
+
+def test_the_mask_of_observed_texels_is_written_only_where_it_is_asked_for(tmp_path: Path) -> None:
+    given = asset(ZURICH, observed_pixels=False, lods=(capsule(observed=half_observed(512)),))
+    for name, profile in (("a.glb", None), ("b.glb", "cesiumjs"), ("c.gltf", None), ("d.glb", "blender"), ("t", None)):
+        write(given, tmp_path / name, profile=profile_named(profile))
+    for path in [*tmp_path.glob("*.gl*"), *tmp_path.glob("t/*.glb")]:
+        assert property_texels(path) <= 64 * 64, "loaders.gl reads all of it for each vertex"
+    facts = inspect(tmp_path / "a.glb")
+    assert facts["parts"] == ["torso", "head", "l_upper_leg"]
+    assert all(0.4 < share < 0.6 for share in facts["observed"].values())
+    write(replace(given, observed_pixels=True), tmp_path / "e.glb")
+    assert property_texels(tmp_path / "e.glb") == 512 * 512
 
 
 def test_indices_become_wide_only_when_they_must(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from exporters.errors import ExportError
 from exporters.georeference import placement_of_tile
 from exporters.gltf.reader import read_gltf
+from exporters.level_error import level_errors
 from exporters.tiles.tileset import (
     VISIBLE_RANGE_PER_ERROR,
     root_tile,
@@ -26,7 +27,7 @@ from exporters.validate import validate
 from georef.errors import InputError
 from georef.geodesy import ecef_from_geodetic
 from georef.placement import GeoPlacement
-from tests.exporters.analytic import ZURICH, asset, capsule
+from tests.exporters.analytic import HEIGHT, ZURICH, asset, capsule, shrinking
 
 
 def _tiles(document: dict) -> list[dict]:
@@ -44,19 +45,19 @@ def test_folder_holds_a_clean_tileset(tmp_path: Path, target: str) -> None:
     assert validate(tmp_path / "figure", external=False) == []
 
 
-def test_levels_run_from_coarse_to_fine_with_their_measured_errors() -> None:
-    given = asset(ZURICH)
+def test_levels_run_from_coarse_to_fine_with_their_errors() -> None:
+    given = asset(ZURICH, lods=shrinking())
     tiles = _tiles(tileset(given))
     assert [tile["content"]["uri"] for tile in tiles] == ["farmer_lod2.glb", "farmer_lod1.glb", "farmer.glb"]
-    assert [tile["geometricError"] for tile in tiles] == [given.lods[2].deviation_m[1], given.lods[1].deviation_m[1], 0]
+    assert [tile["geometricError"] for tile in tiles] == [*level_errors(given.lods)[:0:-1], 0]
     assert tiles[0]["refine"] == "REPLACE"
     assert "transform" not in tiles[1]
 
 
 def test_errors_never_grow_towards_finer_levels() -> None:
-    lods = (capsule(16, 4), capsule(12, 3, deviation_m=(0.01, 0.05)), capsule(8, 2, deviation_m=(0.01, 0.04)))
+    lods = (capsule(16, 4), capsule(12, 3, deviation_m=(0.01, 5.0)), capsule(8, 2, deviation_m=(0.01, 4.0)))
     errors = [tile["geometricError"] for tile in _tiles(tileset(asset(ZURICH, lods=lods)))]
-    assert errors == [0.05, 0.05, 0]
+    assert errors == [5.0, 5.0, 0]
 
 
 @pytest.mark.parametrize("distance", [0.01, 50.0, 2000.0, 1e6])
@@ -64,13 +65,15 @@ def test_visible_from_sets_the_error_of_the_tileset(distance: float) -> None:
     document = tileset(asset(ZURICH), distance)
     assert document["geometricError"] >= document["root"]["geometricError"]
     # 1080 rows, 60 degrees across 1920 columns: CesiumJS stops drawing at 16 pixels, 104 m away per metre of error.
-    assert document["geometricError"] * 104 == pytest.approx(max(distance, 0.0228 * 104), rel=2e-3)
+    smallest = level_errors(asset().lods)[-1] * 104
+    assert document["geometricError"] * 104 == pytest.approx(max(distance, smallest), rel=2e-3)
     assert pytest.approx(103.9, abs=0.1) == VISIBLE_RANGE_PER_ERROR
 
 
-@pytest.mark.parametrize("height", [0.02, 1.0, 1.79, 1800.0, 6186.2, 400_000.0])
+@pytest.mark.parametrize("height", [0.01, 0.02, 1.0, 1.79, 1800.0, 6186.2, 400_000.0])
 def test_the_range_grows_with_the_figure(height: float) -> None:
-    error = tileset(asset(replace(ZURICH, figure_height_m=height)))["geometricError"]
+    lods = tuple(replace(mesh, vertices=mesh.vertices * (height / HEIGHT)) for mesh in shrinking())
+    error = tileset(asset(replace(ZURICH, figure_height_m=height), lods=lods))["geometricError"]
     assert error * 103.923 == pytest.approx(height / 1.79 * 2000, rel=1e-4)
 
 

@@ -16,7 +16,7 @@ from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column, is_known, requ
 from fig2mesh.batch.task import RowTask
 from fig2mesh.batch.tasks import FORMATS, make_task
 from fig2mesh.commands.options import request_options
-from fig2mesh.conversion.fields import request_fields
+from fig2mesh.conversion.fields import parse_value, request_fields
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
@@ -54,9 +54,7 @@ def test_values_arrive_as_on_the_command_line(lon: float, lat: float, triangles:
         ("lonlat", "8.5, 47.4", "lonlat", (8.5, 47.4)),
         ("effect", "light;light", "effects", ("light", "light")),
         ("effect", ("light",), "effects", ("light",)),
-        ("evidence", "no", "evidence", False),
-        ("evidence", True, "evidence", True),
-        ("evidence", 0.0, "evidence", False),
+        ("evidence", "pixels", "evidence", "pixels"),
         ("seed", 7.0, "seed", 7),
         ("height_m", "2.5", "height_m", 2.5),
         ("mask", "m.png", "mask", Path("m.png")),
@@ -67,6 +65,14 @@ def test_values_arrive_as_on_the_command_line(lon: float, lat: float, triangles:
 )
 def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: Any) -> None:
     assert getattr(request_of({"figure": "a.png", column: value}, {}, "n"), parameter) == expected
+
+
+@pytest.mark.parametrize(("value", "expected"), [("no", False), (True, True), (0.0, False), ("yes", True)])
+def test_truth_values_of_tables(value: Any, expected: bool) -> None:
+    (field,) = [each for each in request_fields(Request) if each.field == "overwrite"]
+    assert parse_value(field, value, "column x") is expected
+    with pytest.raises(InputError, match="column x: 'maybe' is not a truth value; give true or false"):
+        parse_value(field, "maybe", "column x")
 
 
 @pytest.mark.parametrize(
@@ -86,7 +92,7 @@ def test_values_of_any_kind(column: str, value: Any, parameter: str, expected: A
         ),
         ({"figure": "a", "triangles": "many"}, "column triangles: 'many' is not a whole number"),
         ({"figure": "a", "seed": -1}, "column seed: -1 is out of range"),
-        ({"figure": "a", "evidence": "maybe"}, "column evidence: 'maybe' is not a truth value; give true or false"),
+        ({"figure": "a", "evidence": "maybe"}, "column evidence: unknown value 'maybe'; choose from parts"),
         ({"figure": "a", "output": "b.glb"}, "column output: is set by the batch; remove the column"),
         ({"figure": "a", "overwrite": True}, "column overwrite: is set by the batch"),
         ({"figure": "a", "save_stages": "x"}, "column save_stages: is set by the batch"),

@@ -190,7 +190,7 @@ BAD_MODELS = {
     "damaged": ("damaged.glb", (), "not a valid glTF file"),
     "blend": ("balls.glb", ("--effects", "blend"), "drawing instead"),
     "joints": ("balls.glb", ("--keypoints", "x.json"), "finished model"),
-    "parts": ("bare.glb", ("--mode", "parts"), "--no-evidence"),
+    "parts": ("bare.glb", ("--mode", "parts"), "--evidence parts"),
     "colours": ("bare.glb", (), "--mode clay"),
 }
 

@@ -16,6 +16,7 @@ from exporters.validate import validate
 from fig2mesh.commands.main import main
 from fig2mesh.measure.model import load_textured, shape_measures
 from fig2mesh.mesh.preview import render_mesh
+from tests.exporters.walk import property_texels
 from tests.fig2mesh.conftest import OUTPUTS, ZURICH, Run
 
 
@@ -93,9 +94,11 @@ def test_evidence_is_shown_and_can_be_left_out(finished: Run, tmp_path: Path) ->
     assert set(shown["observed"]) == set(shown["parts"])
     assert all(0 <= share <= 1 for share in shown["observed"].values())
     assert 0.3 < shown["observed"]["torso"] < 0.7, "the front of it"
+    assert property_texels(finished.output("a.glb")) == 0, "clients read such a texture once per vertex"
+    assert all(property_texels(path) == 0 for path in finished.output("b").glob("*.glb"))
     target = tmp_path / "a.glb"
     arguments = [str(finished.files.image), "--keypoints", str(finished.files.keypoints), "-q", "-o", str(target)]
-    assert main([*arguments, "--quality", "draft", "--parts", "outline", "--no-evidence"]) == 0
+    assert main([*arguments, "--quality", "draft", "--parts", "outline", "--evidence", "none"]) == 0
     plain = inspect(target)
     assert plain["parts"] is None
     assert plain["observed"] is None

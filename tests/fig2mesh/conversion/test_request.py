@@ -81,7 +81,7 @@ OPTIONS = st.fixed_dictionaries(
         "textures": st.sampled_from(["wrap", "none"]),
         "triangles": st.integers(200, 2_000_000),
         "bbox": st.tuples(*[st.integers(0, 9999)] * 4),
-        "evidence": st.booleans(),
+        "evidence": st.sampled_from(["parts", "pixels", "none"]),
         "overwrite": st.booleans(),
         "outputs": st.lists(st.sampled_from(["a.glb", "b.usdz", "tiles/"]), max_size=3).map(tuple),
         "mask": st.sampled_from([Path("m.png"), Path("/x/m.png")]),

@@ -13,6 +13,7 @@ import pytest
 from exporters.asset import Asset
 from exporters.gis.czml import write_czml
 from exporters.gltf.glb import glb_bytes, write_gltf
+from exporters.level_error import level_errors
 from exporters.tiles.tileset import write_tileset
 from fig2mesh.globe.assets import find_assets
 from fig2mesh.globe.page import globe_page, page_files
@@ -182,10 +183,11 @@ def test_observed_or_inferred_is_shown_by_parts(seen: dict[str, Any]) -> None:
 @pytest.mark.slow
 def test_levels_are_forced_and_described(seen: dict[str, Any]) -> None:
     meshes = asset().lods
+    errors = level_errors(meshes)
     for level in range(3):
         shown, text = seen[f"level {level}"]
         assert shown == level
-        error = "the finest mesh" if level == 0 else f"at most {1000 * meshes[level].deviation_m[1]:.3g} mm off"
+        error = "the finest mesh" if level == 0 else f"for pixels of {1000 * errors[level] / 16:.3g} mm and more"
         assert text == f"shown: LOD {level}, {error}, {len(meshes[level].faces):,} triangles"
     assert seen["forced"] is None
     assert seen["current"] == 1
