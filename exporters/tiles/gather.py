@@ -15,21 +15,19 @@ from urllib.parse import unquote
 
 from exporters.atomic_file import write_whole
 from exporters.errors import ExportError
+from exporters.file_names import name_key, safe_name
 from exporters.figure_reader import describe, read_figures
 from exporters.gis.czml import write_packets
 from exporters.gis.geojson import write_collection
 from exporters.placed_figure import PlacedFigure
 from exporters.tiles.b3dm import b3dm_bytes
 from exporters.tiles.check import read_tileset
-from exporters.tiles.tileset import CONTENT_SUFFIXES, TilesVersion, check_distance, safe_name
+from exporters.tiles.tileset import CONTENT_SUFFIXES, TilesVersion, check_distance
 from exporters.tiles.tree import tileset_documents
 from exporters.write import OutputPath, check_file
 
 CONTENT_FOLDER = "figures"
 INDEX, ENTITIES = "index.geojson", "figures.czml"
-
-MAX_NAME_CHARACTERS = 60
-"""Limit of the characters of a file name; file systems allow 255 bytes, and a character takes up to four."""
 
 
 @dataclass(frozen=True)
@@ -146,15 +144,14 @@ def _named(figures: list[PlacedFigure], suffix: str) -> list[tuple[PlacedFigure,
     numbers: dict[str, int] = {}
     pairs = []
     for figure in figures:
-        stem = safe_name(figure.name)[:MAX_NAME_CHARACTERS]
+        stem = safe_name(figure.name)
         while True:
             number = numbers[stem] = numbers.get(stem, 0) + 1
             base = stem if number == 1 else f"{stem}_{number}"
             names = [base + (f"_lod{lod}" if lod else "") + suffix for lod in range(len(figure.contents))]
-            # On case-insensitive file systems Anna and anna are the same file.
-            if not any(name.casefold() in taken for name in names):
+            if not any(name_key(name) in taken for name in names):
                 break
-        taken.update(name.casefold() for name in names)
+        taken.update(map(name_key, names))
         pairs.append((figure, replace(figure, contents=tuple(f"{CONTENT_FOLDER}/{name}" for name in names))))
     return pairs
 

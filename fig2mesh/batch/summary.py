@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
@@ -108,6 +107,7 @@ def summarise(collection: Collection) -> Summary:
 
 def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Sequence[str]) -> None:
     """Write all files into an empty staging folder."""
+    from exporters.file_names import safe_name
     from exporters.gis.geopackage import write_geopackage
     from exporters.gis.stac import StacFile, StacItem, stac_file, write_stac
     from exporters.tiles.gather import write_tree
@@ -131,7 +131,7 @@ def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Se
                 yield StacItem(figure, task.name, tuple(files), date)
 
     over = [stac_file(stage, name) for name in (TILESET, "index.geojson", GEOPACKAGE)]
-    identifier = re.sub(r"[^\w.-]+", "-", collection.title).strip("-.") or "figures"
+    identifier = safe_name(collection.title, "-").strip("-") or "figures"
     write_stac(items(), stage, id=identifier, title=collection.title, files=over)
 
 
