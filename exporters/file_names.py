@@ -13,10 +13,10 @@ from pathlib import PurePath
 from typing import Final
 
 MAX_NAME_CHARACTERS: Final = 60
-"""Characters of a name. Windows and macOS allow 255 UTF-16 units for a file, Windows often only 260 for a whole path."""
+"""Characters of a name. Windows and macOS allow 255 UTF-16 units for a file, Windows often 260 for a whole path."""
 
 MAX_NAME_BYTES: Final = 180
-"""Bytes of a name in UTF-8. Linux allows 255 for a file; numbers, levels, suffixes and temporary names need the rest."""
+"""Bytes of a name in UTF-8. Linux allows 255 for a file; numbers, levels and suffixes need the rest."""
 
 DEVICES: Final = re.compile(r"(CON|PRN|AUX|NUL|CONIN|CONOUT|CLOCK|(COM|LPT)[0-9¹²³])", re.IGNORECASE)
 """Names of devices, which Windows does not accept as names of files, whatever their suffix."""

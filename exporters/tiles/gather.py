@@ -15,8 +15,8 @@ from urllib.parse import unquote
 
 from exporters.atomic_file import write_whole
 from exporters.errors import ExportError
-from exporters.file_names import name_key, safe_name
 from exporters.figure_reader import describe, read_figures
+from exporters.file_names import name_key, safe_name
 from exporters.gis.czml import write_packets
 from exporters.gis.geojson import write_collection
 from exporters.placed_figure import PlacedFigure

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fig2mesh.batch.columns import no_place
 from fig2mesh.batch.row_files import digest_of, files_unchanged, input_files, resolve, sheet_files
 from fig2mesh.batch.task import Batch, RowTask
 from fig2mesh.conversion.request import PlaceRequest, Request
@@ -40,8 +41,8 @@ class ResolvedRow:
             time_span(task.date, "column date")
         resolved = resolve(task.request, batch.roots, task.own_files)
         self.request: Request = replace(resolved, outputs=self.targets)
-        if not (resolved.has_place or batch.unplaced):
-            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or use --unplaced")
+        if not resolved.has_place and (resolved.at is not None or not batch.unplaced):
+            raise no_place(resolved, task.attributes)
         files = input_files(resolved)
         self.inputs: dict[str, str] = {
             self._relative(file): digest_of(file) for name in sorted(files) for file in files[name]

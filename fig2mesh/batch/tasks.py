@@ -16,7 +16,8 @@ from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.columns import attributes_of, request_of
 from fig2mesh.batch.row_files import FILE_FIELDS
 from fig2mesh.batch.task import Problem, RowTask
-from fig2mesh.conversion.fields import as_plain, list_of
+from fig2mesh.conversion.cells import date_of
+from fig2mesh.conversion.fields import as_plain, cell_text, list_of
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
@@ -72,7 +73,7 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     problem = None if row.problem is None else _problem(row.where, row.problem)
     given = values.get("name")
     picture = PurePosixPath(str(values.get("figure", "")).replace("\\", "/"))
-    title = str(given) if given is not None else figure_name(picture) or f"row {row.number}"
+    title = cell_text(given) if given is not None else figure_name(picture) or f"row {row.number}"
     wanted = safe_name(title)
     name, number = wanted, 1
     while (taken := names.take(name, row.number, title)) is not None:
@@ -105,7 +106,7 @@ def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], prob
         title,
         request,
         formats,
-        None if date is None else str(date),
+        None if date is None else date_of(date),
         attributes_of(values),
         tuple(field for field in FILE_FIELDS if field in values),
         problem,

@@ -83,7 +83,8 @@ def test_safe_names_are_portable_and_do_not_change_again(name: str) -> None:
     found = safe_name(name)
     assert safe_name(found) == found
     assert found == unicodedata.normalize("NFC", found)
-    assert found[0] not in ".-" and found[-1] not in ". "
+    assert found[0] not in ".-"
+    assert found[-1] not in ". "
     assert not PureWindowsPath(found).is_reserved()
     assert PurePosixPath(found).name == PureWindowsPath(found).name == found
     assert not set('<>:"/\\|?*') & set(found)

@@ -23,7 +23,8 @@ from fig2mesh.batch.collections.geojson_feature import (
     read_feature,
     skip,
 )
-from fig2mesh.batch.collections.rows import MAX_NESTING, InvalidValue, Row, make_row, shown
+from fig2mesh.batch.collections.rows import MAX_NESTING, Row, make_row
+from fig2mesh.batch.collections.values import InvalidValue, shown
 from fig2mesh.errors import InputError
 
 MAX_LINE = 1 << 24
