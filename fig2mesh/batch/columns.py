@@ -112,7 +112,8 @@ def _check_degrees(lon: Value, lat: Value) -> None:
         if isinstance(value, int | float) and abs(value) > limit:
             swapped = column == "lat" and isinstance(other, int | float) and abs(value) <= 180 and abs(other) <= 90
             remedy = "are lon and lat swapped?" if swapped else f"give degrees, or transform it first ({TO_DEGREES})"
-            raise InputError(f"column {column}", f"{value:.15g} is outside -{limit}..{limit}", remedy)
+            name = "latitude" if column == "lat" else "longitude"
+            raise InputError(f"column {column}", f"{name} {value:.15g} is outside -{limit}..{limit}", remedy)
 
 
 def no_place(request: Request, attributes: Mapping[str, Value]) -> InputError:

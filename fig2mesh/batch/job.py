@@ -72,7 +72,9 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
             log.info("%d rows: %d valid, %d invalid", count, count - tally.failed, tally.failed)
         else:
             title = request.title or request.collection.stem
-            summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
+            summary = summarise_apart(
+                Collection(folder, spool, tuple(unknown), title, request.visible_from, request.license)
+            )
             _log_summary(folder, tally, summary)
             if summary.figures and (note := short_range_warning(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)

@@ -61,6 +61,13 @@ class ResolvedRow:
         real, root = Path(os.path.realpath(file)), self.batch.roots.root
         return (real.relative_to(root) if real.is_relative_to(root) else real).as_posix()
 
+    @property
+    def source(self) -> str:
+        """The picture as the table names it, so that it can be found again; no folders of this machine."""
+        assert self.task.request is not None
+        path = self.task.request.figure
+        return self._relative(self.request.figure) if path.is_absolute() else path.as_posix()
+
     def sheet(self) -> MapSheet | None:
         """Map sheet of the place, if any. Raises InputError."""
         from fig2mesh.conversion.place import open_map

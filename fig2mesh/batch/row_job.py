@@ -30,9 +30,9 @@ READ = "figure"
 MEASURES = "measures"
 """Name of the result of measuring the model, which takes longer than writing it."""
 
-UNKNOWN_DATE = "0001/9999"
-"""Date in the catalogue, which requires one. The modification time of a file is not that of the drawing, and copying
-changes it."""
+UNKNOWN_DATE = "1678/2261"
+"""Date in the catalogue, which requires one: all years that pandas can hold, in nanoseconds from 1970. The modification
+time of a file is not that of the drawing, and copying changes it."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -185,7 +185,7 @@ def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance
     }
     if asset.placement is not None:
         contents = tuple(f"{task.name}/{name}" for name in _levels(row, asset))
-        whole = replace(figure_of(asset, contents), attributes=_plain(task.attributes))
+        whole = replace(figure_of(asset, contents), attributes=_plain(task.attributes), source=row.source)
         record["figure"] = asdict(whole)
     return record
 

@@ -24,7 +24,15 @@ from fig2mesh.errors import InputError
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
 """Formats that a row may request; .glb is always made."""
 
-TAKEN: Final = ("tileset.json", "index.geojson", "index.gpkg", "figures.czml", "collection.json", "manifest.jsonl")
+TAKEN: Final = (
+    "tileset.json",
+    "index.geojson",
+    "index.gpkg",
+    "figures.czml",
+    "collection.json",
+    "manifest.jsonl",
+    "license.txt",
+)
 """Names of files in the output folder, which no figure may have."""
 
 FURTHER: Final = re.compile(r"tileset_\d+\.json", re.IGNORECASE)

@@ -258,9 +258,9 @@ def test_places_that_are_not_clear_are_named(tmp_path: Path, values: dict[str, A
 @pytest.mark.parametrize(
     ("lon", "lat", "message"),
     [
-        (47.4, 108.5, "column lat: 108.5 is outside -90..90; are lon and lat swapped?"),
-        (8.5, 1247000.0, "column lat: 1247000 is outside -90..90; give degrees, or transform it first"),
-        (200.0, 47.4, "column lon: 200 is outside -180..180; give degrees"),
+        (47.4, 108.5, "column lat: latitude 108.5 is outside -90..90; are lon and lat swapped?"),
+        (8.5, 1247000.0, "column lat: latitude 1247000 is outside -90..90; give degrees, or transform it first"),
+        (200.0, 47.4, "column lon: longitude 200 is outside -180..180; give degrees"),
     ],
 )
 def test_degrees_out_of_range(lon: float, lat: float, message: str) -> None:
