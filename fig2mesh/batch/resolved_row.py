@@ -105,7 +105,9 @@ class ResolvedRow:
     def check_values(self) -> None:
         """Check everything that needs no reading of the figure. Raises InputError."""
         self.profile()
-        self.sheet()
+        sheet, at = self.sheet(), self.request.at
+        if sheet is not None and at is not None:
+            sheet.place(*at, source="columns x, y")
 
     def check(self) -> None:
         """Check the values, and read the given files of the figure. Raises InputError."""

@@ -47,6 +47,9 @@ def check_row(batch: Batch, task: RowTask) -> Outcome:
     """Read all files of a row and report problems, without writing anything or running a network."""
     try:
         ResolvedRow(batch, task).check()
+        if batch.target is not None:
+            before = Ledger(batch.target).read(task.name) if (batch.target / WORK).is_dir() else None
+            check_free(batch.target / task.name, bool(before and before.get("claimed")), batch.overwrite)
     except InputError as error:
         return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
     except Exception as error:
@@ -130,15 +133,20 @@ def _line(error: Exception) -> str:
     return " ".join(without_temporary(str(error)).split())[:500] or type(error).__name__
 
 
-def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) -> None:
-    """Record that the folder of a figure belongs to the batch, and remove temporary files of workers that died."""
-    target = batch.folder / task.name
+def check_free(target: Path, claimed: bool, overwrite: bool) -> None:
+    """Raise OutputError for the folder of a figure that the batch may not replace; claimed : whether it is its own."""
     if target.is_symlink():
         raise OutputError(target, "is a link", "remove it, or rename the figure")
-    if not record.get("claimed") and os.path.lexists(target) and not batch.overwrite:
+    if not claimed and os.path.lexists(target) and not overwrite:
         raise OutputError(
             target, "already exists, and is not from an earlier batch", "use --overwrite or choose another -o DIR"
         )
+
+
+def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) -> None:
+    """Record that the folder of a figure belongs to the batch, and remove temporary files of workers that died."""
+    target = batch.folder / task.name
+    check_free(target, bool(record.get("claimed")), batch.overwrite)
     record["claimed"] = True
     ledger.write(task.name, record)
     if target.is_dir():

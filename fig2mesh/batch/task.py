@@ -16,6 +16,7 @@ class Batch:
 
     roots : of the input files; folder : of the outputs; fresh : ignore stored results
     overwrite : replace folders that are not from an earlier batch; unplaced : accept rows without a place
+    target : folder that a dry run checks instead of writing into `folder`
     """
 
     roots: Roots
@@ -23,6 +24,7 @@ class Batch:
     fresh: bool = False
     overwrite: bool = False
     unplaced: bool = False
+    target: Path | None = None
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,8 @@ def parse(request: ParseRequest, quiet: bool, verbose: int) -> None:
     """Find the figure in the picture FIGURE; write keypoints.json, mask.png and part_labels.png.
 
     The files cover the whole picture. Correct them by hand if necessary, and give them to the main command as
-    --keypoints, --mask and --part-labels; after --all, add the --bbox printed for each figure. Files given here with
+    --keypoints, --mask and --part-labels; after --all, add the --bbox printed for each figure, or give figures.csv to
+    `fig2mesh batch`; overview.jpg shows the boxes with their numbers. Files given here with
     --mask, --keypoints or --part-labels are kept, and only the rest is inferred.
     """
     configure_logging(quiet, verbose)
@@ -80,23 +81,43 @@ def parse_figure(request: ParseRequest) -> None:
 
 
 def parse_sheet(request: ParseRequest, quiet: bool) -> None:
-    """Find all figures of a sheet and write a folder for each."""
+    """Find all figures of a sheet; write a folder for each, and a table of all for `fig2mesh batch`."""
     from fig2mesh.parse.files import FIGURES, write_sheet
     from fig2mesh.parse.picture import on_white, read_view
+    from fig2mesh.parse.sheet_table import OVERVIEW, TABLE
 
     folder, sheet = request.output, request.figure
     if (folder / FIGURES).exists() and not request.overwrite:
         raise OutputError(folder / FIGURES, "already exists", "use --overwrite or choose another folder")
+    georeference = georeference_of(sheet)
     view = read_view(sheet, None)
     # torch takes seconds to load, so it is imported after all checks.
     from fig2mesh.parse.sheet import figures_in
 
+    rgb = on_white(view.rgba)
     with progress(quiet) as advance:
-        figures = figures_in(on_white(view.rgba), request.smallest, advance)
-    names = write_sheet(folder, figures, sheet.name, view.size, request.format, request.overwrite)
+        figures = figures_in(rgb, request.smallest, advance)
+    names = write_sheet(folder, figures, sheet, rgb, request.format, request.overwrite, georeference)
     for name, figure in zip(names, figures, strict=True):
         box = " ".join(map(str, figure.bbox))
         doubts = f"; {'; '.join(figure.found.doubts)}" if figure.found.doubts else ""
-        log.info("%s: --bbox %s, confidence %.2f%s", folder / name, box, figure.confidence, doubts)
-    if not figures:
+        click.echo(f"{folder / name}: --bbox {box}, confidence {figure.confidence:.2f}{doubts}")
+    if figures:
+        log.info("%s: numbered boxes; %s: input of fig2mesh batch", folder / OVERVIEW, folder / TABLE)
+        if georeference is None:
+            log.info("%s: without places: fill in lon and lat, or use --map or --unplaced", folder / TABLE)
+    else:
         log.warning("%s: no figure found; search for smaller ones with --smallest PX", sheet)
+
+
+def georeference_of(sheet: Path) -> list[Path] | None:
+    """Files beside a sheet that may hold its georeference; None if there is none, or it is not complete."""
+    from fig2mesh.batch.row_files import sheet_files
+    from georef.mapsheet import read_sheet
+
+    try:
+        read_sheet(sheet)
+    except InputError as error:
+        log.debug("%s", error)
+        return None
+    return sheet_files(sheet)
