@@ -65,6 +65,8 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
                 tally.add(notice)
                 for watcher in watchers:
                     watcher.row(notice, tally)
+                if verbose > 1 and notice.trace is not None:
+                    log.debug("%s", notice.trace.rstrip())
                 if notice.full and not request.dry_run:
                     raise OutputError(folder, "the disk is full", "free some space and run the same command again")
                 if notice.lost and not request.dry_run:

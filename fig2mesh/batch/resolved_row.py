@@ -104,8 +104,12 @@ class ResolvedRow:
 
     def check_values(self) -> None:
         """Check everything that needs no reading of the figure. Raises InputError."""
+        from fig2mesh.conversion.place import is_drawn_on
+
         self.profile()
         sheet, at = self.sheet(), self.request.at
+        if sheet is not None:
+            is_drawn_on(sheet, at, self.request.figure)
         if sheet is not None and at is not None:
             sheet.place(*at, source="columns x, y")
 

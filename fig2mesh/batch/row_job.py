@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -51,9 +52,11 @@ def check_row(batch: Batch, task: RowTask) -> Outcome:
             before = Ledger(batch.target).read(task.name) if (batch.target / WORK).is_dir() else None
             check_free(batch.target / task.name, bool(before and before.get("claimed")), batch.overwrite)
     except InputError as error:
-        return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
+        line, trace = batch.roots.shorten(_line(error)), traceback.format_exc()
+        return Outcome(task.number, task.name, "failed", line, trace=trace)
     except Exception as error:
-        return Outcome(task.number, task.name, "failed", _line(error), internal=True)
+        line = f"internal error: {type(error).__name__}: {_line(error)}"
+        return Outcome(task.number, task.name, "failed", line, internal=True, trace=traceback.format_exc())
     return Outcome(task.number, task.name, "done")
 
 
@@ -99,7 +102,8 @@ def convert_row(batch: Batch, task: RowTask, advance: Advance = lambda stage: No
     except OSError as error:
         record |= {"status": "failed", "error": f"its record cannot be written ({error.strerror})"}
         record["full"] = error.errno in FULL
-    return _outcome(task, record)
+    trace = None if fault is None else "".join(traceback.format_exception(fault))
+    return replace(_outcome(task, record), trace=trace)
 
 
 def _outcome(task: RowTask, record: dict[str, Any], unchanged: bool = False) -> Outcome:

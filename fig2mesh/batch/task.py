@@ -68,7 +68,7 @@ class Outcome:
 
     status : done or failed; error : one line, None if done; internal : internal error, not a fault of the input
     lost : its worker could not record it; full : the disk is full; unchanged : the outputs were up to date
-    seconds : of work; ran, reused : stages; counts : work done, by kind
+    seconds : of work; ran, reused : stages; counts : work done, by kind; trace : traceback of a failure
     """
 
     number: int
@@ -83,3 +83,4 @@ class Outcome:
     ran: tuple[str, ...] = ()
     reused: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
+    trace: str | None = None
