@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -12,6 +12,9 @@ from fig2mesh.conversion.fields import option, request_class
 from fig2mesh.conversion.request import FigureFiles
 from fig2mesh.errors import InputError, OutputError
 from fig2mesh.terminal import configure_logging, log, progress
+
+if TYPE_CHECKING:
+    from fig2mesh.parse.sheet import SheetFigure
 
 JointFormat = Literal["fig2mesh", "coco", "labelme", "supervisely"]
 
@@ -97,7 +100,8 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
     rgb = on_white(view.rgba)
     with progress(quiet) as advance:
         figures = figures_in(rgb, request.smallest, advance)
-    names = write_sheet(folder, figures, sheet, rgb, request.format, request.overwrite, georeference)
+    feet = None if georeference is None else [feet_on_sheet(figure) for figure in figures]
+    names = write_sheet(folder, figures, sheet, rgb, request.format, request.overwrite, feet, georeference or ())
     for name, figure in zip(names, figures, strict=True):
         box = " ".join(map(str, figure.bbox))
         doubts = f"; {'; '.join(figure.found.doubts)}" if figure.found.doubts else ""
@@ -108,6 +112,19 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
             log.info("%s: without places: fill in lon and lat, or use --map or --unplaced", folder / TABLE)
     else:
         log.warning("%s: no figure found; search for smaller ones with --smallest PX", sheet)
+
+
+def feet_on_sheet(figure: SheetFigure) -> tuple[float, float]:
+    """Pixel (x, y) of the sheet where a figure stands."""
+    import numpy as np
+
+    from fig2mesh.asset_frame import foot_on_picture
+    from fig2mesh.records import Figure
+
+    found, (x0, y0) = figure.found, figure.bbox[:2]
+    blank = np.zeros((*found.mask.shape, 4), np.uint8)
+    alone = Figure("", blank, found.mask, found.joints_px, found.visible, found.part_labels, origin_px=(x0, y0))
+    return foot_on_picture(alone)
 
 
 def georeference_of(sheet: Path) -> list[Path] | None:

@@ -14,7 +14,7 @@ from exporters.atomic_file import write_whole
 from fig2mesh.parse.annotation import Annotation, on_whole_picture, save_annotation
 from fig2mesh.parse.joint_writers import as_coco
 from fig2mesh.parse.read import Reading
-from fig2mesh.parse.sheet_table import OVERVIEW, link_sheet, overview, write_table
+from fig2mesh.parse.sheet_table import OVERVIEW, Point, link_sheet, overview, write_table
 from fig2mesh.records import ByteArray
 
 if TYPE_CHECKING:
@@ -31,7 +31,8 @@ def write_sheet(
     rgb: ByteArray,
     kind: str,
     overwrite: bool,
-    georeference: Sequence[Path] | None = None,
+    feet: Sequence[Point] | None = None,
+    beside: Sequence[Path] = (),
 ) -> list[str]:
     """Write figures.json, which is COCO, a folder of annotations for each figure, the table and the overview; all or
     none.
@@ -40,7 +41,8 @@ def write_sheet(
     figures there is only figures.json.
 
     rgb : (H, W, 3) the sheet; kind : of the joints files
-    georeference : files beside the sheet that may hold it; None if the sheet has none
+    feet : pixel of the sheet where each figure stands; None if the sheet is no map
+    beside : files of the sheet that may hold its georeference
     returns : names of the folders
     """
     size = (rgb.shape[1], rgb.shape[0])
@@ -56,8 +58,8 @@ def write_sheet(
             (stage / name).mkdir()
             save_annotation(stage / name, inside, sheet.name, kind, size, figure.bbox[:2])
         if figures:
-            linked = link_sheet(folder, stage, sheet, georeference or ())
-            write_table(stage, names, figures, linked, georeference is not None)
+            linked = link_sheet(folder, stage, sheet, beside)
+            write_table(stage, names, figures, linked, feet)
             overview(rgb, figures).save(stage / OVERVIEW, quality=85)
         text = json.dumps(coco_of(figures, names, size, sheet.name), indent=1, ensure_ascii=False)
         (stage / FIGURES).write_text(text + "\n", encoding="utf-8")

@@ -9,15 +9,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from fig2mesh.asset_frame import foot_on_picture
 from fig2mesh.parse.annotation import KEYPOINTS, MASK, PART_LABELS
-from fig2mesh.records import ByteArray, Figure
+from fig2mesh.records import ByteArray
 
 if TYPE_CHECKING:
     from fig2mesh.parse.sheet import SheetFigure
+
+Point = tuple[float, float]
 
 TABLE, OVERVIEW = "figures.csv", "overview.jpg"
 
@@ -31,20 +31,20 @@ BOX, LABEL = (220, 20, 60), (255, 255, 255)
 
 
 def write_table(
-    folder: Path, names: Sequence[str], figures: Sequence[SheetFigure], sheet: str, georeferenced: bool
+    folder: Path, names: Sequence[str], figures: Sequence[SheetFigure], sheet: str, feet: Sequence[Point] | None
 ) -> None:
     """Write figures.csv: a row for each figure, with its files, its box on the sheet and its score.
 
     folder : of the table and of a folder with the annotation of each figure; sheet : path from there
-    georeferenced : whether the sheet is a map; `x` and `y` are then the pixel of the feet, else `lon` and `lat` are
-        columns to fill in
+    feet : pixel of the sheet where each stands, if the sheet is a map, for `x` and `y`; else None, and `lon` and `lat`
+        are columns to fill in
     """
-    place = ("map", "x", "y") if georeferenced else ("lon", "lat")
+    place = ("map", "x", "y") if feet is not None else ("lon", "lat")
     columns = ("name", "figure", "bbox", "keypoints", "mask", "part_labels", *place, "score")
     with (folder / TABLE).open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, columns, lineterminator="\n")
         table.writeheader()
-        for name, figure in zip(names, figures, strict=True):
+        for index, (name, figure) in enumerate(zip(names, figures, strict=True)):
             row = {
                 "name": name,
                 "figure": sheet,
@@ -54,18 +54,10 @@ def write_table(
                 "part_labels": f"{name}/{PART_LABELS}",
                 "score": round(figure.confidence, 3),
             }
-            if georeferenced:
-                x, y = feet_on_sheet(figure)
+            if feet is not None:
+                x, y = feet[index]
                 row |= {"map": sheet, "x": round(x, 2), "y": round(y, 2)}
             table.writerow(row)
-
-
-def feet_on_sheet(figure: SheetFigure) -> tuple[float, float]:
-    """Pixel (x, y) of the sheet where a figure stands."""
-    found, (x0, y0) = figure.found, figure.bbox[:2]
-    blank = np.zeros((*found.mask.shape, 4), np.uint8)
-    alone = Figure("", blank, found.mask, found.joints_px, found.visible, found.part_labels, origin_px=(x0, y0))
-    return foot_on_picture(alone)
 
 
 def overview(rgb: ByteArray, figures: Sequence[SheetFigure]) -> Image.Image:

@@ -10,12 +10,12 @@ import pytest
 from PIL import Image
 
 from fig2mesh.commands.main import main
-from fig2mesh.commands.parse import georeference_of
+from fig2mesh.commands.parse import feet_on_sheet, georeference_of
 from fig2mesh.parse.files import write_sheet
 from fig2mesh.parse.infer import Inference
 from fig2mesh.parse.keypoints import read_keypoints
 from fig2mesh.parse.sheet import SheetFigure
-from fig2mesh.parse.sheet_table import MAX_OVERVIEW_PX, feet_on_sheet, overview
+from fig2mesh.parse.sheet_table import MAX_OVERVIEW_PX, overview
 from tests.drawn import write_figure
 
 CORNER = (40, 30)
@@ -50,7 +50,9 @@ def figure(sheet: Path) -> SheetFigure:
 
 def _write(folder: Path, sheet: Path, figure: SheetFigure) -> list[dict[str, str]]:
     rgb = np.asarray(Image.open(sheet).convert("RGB"))
-    write_sheet(folder, [figure], sheet, rgb, "fig2mesh", False, georeference_of(sheet))
+    beside = georeference_of(sheet)
+    feet = None if beside is None else [feet_on_sheet(figure)]
+    write_sheet(folder, [figure], sheet, rgb, "fig2mesh", False, feet, beside or ())
     with (folder / "figures.csv").open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
 
