@@ -48,11 +48,11 @@ def figure(sheet: Path) -> SheetFigure:
     return SheetFigure((x, y, x + width, y + height), 0.876543, found)
 
 
-def _write(folder: Path, sheet: Path, figure: SheetFigure) -> list[dict[str, str]]:
+def _write(folder: Path, sheet: Path, figure: SheetFigure, overwrite: bool = False) -> list[dict[str, str]]:
     rgb = np.asarray(Image.open(sheet).convert("RGB"))
     beside = georeference_of(sheet)
     feet = None if beside is None else [feet_on_sheet(figure)]
-    write_sheet(folder, [figure], sheet, rgb, "fig2mesh", False, feet, beside or ())
+    write_sheet(folder, [figure], sheet, rgb, "fig2mesh", overwrite, feet, beside or ())
     with (folder / "figures.csv").open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
 
@@ -110,3 +110,11 @@ def test_the_coco_file_is_refused_by_naming_the_table(
         assert "is a COCO file of annotations, not a collection" in printed
         assert remedy in printed
         (tmp_path / "out" / "figures.csv").unlink(missing_ok=True)
+
+
+def test_a_second_run_replaces_the_first(sheet: Path, figure: SheetFigure, tmp_path: Path) -> None:
+    first = _write(tmp_path / "out", sheet, figure)
+    before = sheet.read_bytes()
+    assert _write(tmp_path / "out", sheet, figure, overwrite=True) == first
+    assert sheet.read_bytes() == before == (tmp_path / "out" / sheet.name).read_bytes()
+    assert not [path for path in (tmp_path / "out").iterdir() if path.name.startswith(".")]
