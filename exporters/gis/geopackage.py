@@ -1,6 +1,6 @@
 """GeoPackage: figures as a layer of points with attributes, for GIS; the same as `index.geojson`, with an index.
 
-https://www.geopackage.org/spec140/
+https://www.geopackage.org/spec120/
 https://gdal.org/en/stable/drivers/vector/gpkg.html
 """
 
@@ -25,6 +25,9 @@ from exporters.placed_figure import PlacedFigure
 FIGURES_LAYER, FAILED_TABLE = "figures", "failed"
 
 FAILED_COLUMNS: dict[str, type] = {"row": int, "name": str, "error": str}
+
+VERSION = "1.2"
+"""Of GeoPackage; GDAL before 3.7 (QGIS of 2022) warns about later ones, which have nothing that is needed here."""
 
 GDAL_OPTIONS = {"OGR_CURRENT_DATE": "1970-01-01T00:00:00.000Z", "OGR_SQLITE_SYNCHRONOUS": "OFF"}
 """GDAL's settings for writing: a fixed date, so that the same figures give the same bytes; and no synchronous writes,
@@ -96,6 +99,8 @@ def _write_table(path: Path, layer: str, table: TableSpool, dimensions: int) -> 
             "promote_to_multi": False,
         }
         options["layer_options"] |= {"GEOMETRY_NAME": reserved[1], "SPATIAL_INDEX": "YES"}
+    if not path.exists():
+        options["dataset_options"] = {"VERSION": VERSION}
     append = False
     for rows in table.chunks() if table.rows else iter([[]]):
         pairs = [column_arrays([row.get(name) for _, row in rows], kind) for name, kind in columns.items()]
@@ -103,6 +108,7 @@ def _write_table(path: Path, layer: str, table: TableSpool, dimensions: int) -> 
         data, masks = [values for values, _ in pairs], [mask for _, mask in pairs]
         pyogrio.raw.write(path, geometry, data, list(columns), field_mask=masks, append=append, **options)
         append = True
+        options.pop("dataset_options", None)
 
 
 def _point_wkb(coordinates: list[float]) -> bytes:

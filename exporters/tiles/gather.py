@@ -16,20 +16,20 @@ from urllib.parse import unquote
 from exporters.atomic_file import write_whole
 from exporters.errors import ExportError
 from exporters.figure_reader import describe, read_figures
+from exporters.file_digest import sha256_of
+from exporters.file_names import name_key, safe_name
 from exporters.gis.czml import write_packets
 from exporters.gis.geojson import write_collection
 from exporters.placed_figure import PlacedFigure
 from exporters.tiles.b3dm import b3dm_bytes
 from exporters.tiles.check import read_tileset
-from exporters.tiles.tileset import CONTENT_SUFFIXES, TilesVersion, check_distance, safe_name
+from exporters.tiles.tileset import CONTENT_SUFFIXES, TilesVersion, check_distance
 from exporters.tiles.tree import tileset_documents
 from exporters.write import OutputPath, check_file
+from georef.placement import GeoPlacement
 
 CONTENT_FOLDER = "figures"
 INDEX, ENTITIES = "index.geojson", "figures.czml"
-
-MAX_NAME_CHARACTERS = 60
-"""Limit of the characters of a file name; file systems allow 255 bytes, and a character takes up to four."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,13 @@ class WrittenTileset:
     """Result of `write_figures`.
 
     figures : their number; tallest_m : height of the tallest one; files : the tileset.json last
+    notes : on figures that are there more than once, one line each
     """
 
     figures: int
     tallest_m: float
     files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
 
 def write_figures(
@@ -55,7 +57,8 @@ def write_figures(
 ) -> WrittenTileset:
     """Collect figures from files into one tileset, which is written atomically.
 
-    sources : as for `exporters.figure_reader.read_figures`; duplicate files count once
+    sources : as for `exporters.figure_reader.read_figures`; duplicate files count once, and so does a figure that is
+        there as .glb and as a tileset, of which the latter is kept
     folder : of the tileset, or its tileset.json; missing folders are created, unrelated files in it are kept
     visible_from_m, version : see `exporters.tiles.tileset.write_tileset`
     overwrite : replace existing files; files of an earlier tileset of figures there that are not replaced are removed
@@ -70,7 +73,8 @@ def write_figures(
     check_distance(visible_from_m)
     main = Path(folder) if Path(folder).name == "tileset.json" else Path(folder) / "tileset.json"
     check_file(folder, main, overwrite)
-    pairs = _named(_in_order(_gather(sources)), CONTENT_SUFFIXES[version])
+    found, notes = without_copies(_gather(sources))
+    pairs = _named(_in_order(found), CONTENT_SUFFIXES[version])
     figures = [figure for _, figure in pairs]
     if not overwrite:
         _check_free(main.parent, figures)
@@ -84,7 +88,8 @@ def write_figures(
 
     outdated = list(_own_files(main)) if overwrite and main.is_file() else []
     tallest_m = max(figure.placement.figure_height_m for figure in figures)
-    return WrittenTileset(len(figures), tallest_m, write_whole(folder, main, fill, overwrite, outdated))
+    files = write_whole(folder, main, fill, overwrite, outdated)
+    return WrittenTileset(len(figures), tallest_m, files, notes)
 
 
 def write_tree(
@@ -126,6 +131,33 @@ def _gather(sources: Iterable[Path]) -> list[PlacedFigure]:
     return list(found.values())
 
 
+def without_copies(figures: list[PlacedFigure]) -> tuple[list[PlacedFigure], tuple[str, ...]]:
+    """Figures without models that are there as tilesets too, and notes on these and on others of one name in one spot.
+
+    A model is that of a tileset if name, place and content are those of its finest level.
+    """
+    spots: dict[tuple[str, GeoPlacement], list[PlacedFigure]] = {}
+    for figure in figures:
+        spots.setdefault((figure.name, figure.placement), []).append(figure)
+    kept, notes = [], []
+    for (name, _), alike in spots.items():
+        alone = [figure for figure in alike if not _has_tileset(figure)] if len(alike) > 1 else []
+        tiled = {sha256_of(Path(each.contents[0])): each for each in alike if alone and _has_tileset(each)}
+        same = [(each, tiled.get(sha256_of(Path(each.contents[0])))) for each in alone if tiled]
+        copies = [(each, tileset) for each, tileset in same if tileset is not None]
+        for each, tileset in copies:
+            notes.append(f"{each.contents[0]}: the same figure as {tileset.contents[0]}, {name}; left out")
+        left = [figure for figure in alike if all(figure is not each for each, _ in copies)]
+        kept += left
+        if len(left) > 1:
+            notes.append(f"{name}: {len(left)} figures of this name stand in one spot, and hide each other")
+    return kept, tuple(notes)
+
+
+def _has_tileset(figure: PlacedFigure) -> bool:
+    return (Path(figure.contents[0]).parent / "tileset.json").is_file()
+
+
 def _in_order(figures: list[PlacedFigure]) -> list[PlacedFigure]:
     """Sort figures independently of their input order: by name, then place and other facts, then content."""
     ordered: list[PlacedFigure] = []
@@ -146,15 +178,14 @@ def _named(figures: list[PlacedFigure], suffix: str) -> list[tuple[PlacedFigure,
     numbers: dict[str, int] = {}
     pairs = []
     for figure in figures:
-        stem = safe_name(figure.name)[:MAX_NAME_CHARACTERS]
+        stem = safe_name(figure.name)
         while True:
             number = numbers[stem] = numbers.get(stem, 0) + 1
             base = stem if number == 1 else f"{stem}_{number}"
             names = [base + (f"_lod{lod}" if lod else "") + suffix for lod in range(len(figure.contents))]
-            # On case-insensitive file systems Anna and anna are the same file.
-            if not any(name.casefold() in taken for name in names):
+            if not any(name_key(name) in taken for name in names):
                 break
-        taken.update(name.casefold() for name in names)
+        taken.update(map(name_key, names))
         pairs.append((figure, replace(figure, contents=tuple(f"{CONTENT_FOLDER}/{name}" for name in names))))
     return pairs
 

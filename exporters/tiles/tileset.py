@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -23,6 +22,7 @@ from urllib.parse import quote
 
 from exporters.asset import Asset, TexturedMesh, without_outline
 from exporters.errors import ExportError
+from exporters.file_names import safe_name
 from exporters.georeference import georeference
 from exporters.gltf.glb import glb_bytes
 from exporters.level_error import MAX_SCREEN_SPACE_ERROR_PX, level_errors
@@ -52,11 +52,6 @@ BOX_MARGIN_M = 1e-3
 def content_name(name: str, lod: int, version: TilesVersion = "1.1") -> str:
     """File name of a level of detail of the asset called `name`: `name.glb`, `name_lod1.glb`, ..."""
     return safe_name(name) + (f"_lod{lod}" if lod else "") + CONTENT_SUFFIXES[version]
-
-
-def safe_name(name: str) -> str:
-    """Replace characters by underscores that could lead out of the folder or hide the file."""
-    return re.sub(r"[^\w.-]+", "_", name).strip(".") or "figure"
 
 
 def write_tileset(

@@ -18,6 +18,18 @@ from fig2mesh.errors import InputError
 PAIRS = {"lonlat": ("lon", "lat"), "at": ("x", "y")}
 """Fields of two numbers, and the two columns that make up each."""
 
+TO_DEGREES = "ogr2ogr -t_srs EPSG:4326"
+
+# fmt: off
+LIKELY_PLACES = frozenset((
+    "easting", "northing", "east", "north", "e", "n", "utm_e", "utm_n", "xcoord", "ycoord", "x_coord", "y_coord",
+    "point_x", "point_y", "coord_x", "coord_y", "longitud", "latitud", "longitude_deg", "latitude_deg", "laenge",
+    "länge", "breite", "lon_dd", "lat_dd", "lonx", "laty", "rechtswert", "hochwert", "coordinates", "coords",
+    "location", "latlon", "lat_lon", "latlong", "lat_long", "geometry", "geom", "the_geom", "shape",
+))
+# fmt: on
+"""Names of columns that may hold a place, but of which kind is not clear."""
+
 OWN_COLUMNS = ("figure", "format", "date", *(column for pair in PAIRS.values() for column in pair))
 """Columns that are not options of the main command."""
 
@@ -88,8 +100,35 @@ def _pairs(values: Mapping[str, Value]) -> dict[str, Any]:
                 raise InputError(
                     f"column {name}", f"cannot be combined with {pair[0]} and {pair[1]}", "give one of them"
                 )
+            if name == "lonlat":
+                _check_degrees(*given)
             found[name] = parse_value(fields_by_column()[name], tuple(given), f"column {pair[0]}")
     return found
+
+
+def _check_degrees(lon: Value, lat: Value) -> None:
+    """Raise InputError for numbers that cannot be longitude and latitude, WGS 84 degrees."""
+    for column, value, limit, other in (("lat", lat, 90, lon), ("lon", lon, 180, lat)):
+        if isinstance(value, int | float) and abs(value) > limit:
+            swapped = column == "lat" and isinstance(other, int | float) and abs(value) <= 180 and abs(other) <= 90
+            remedy = "are lon and lat swapped?" if swapped else f"give degrees, or transform it first ({TO_DEGREES})"
+            name = "latitude" if column == "lat" else "longitude"
+            raise InputError(f"column {column}", f"{name} {value:.15g} is outside -{limit}..{limit}", remedy)
+
+
+def no_place(request: Request, attributes: Mapping[str, Value]) -> InputError:
+    """Error of a row without a place; it names what could be meant as one."""
+    if request.at is not None:
+        x, y = request.at
+        if abs(x) <= 180 and abs(y) <= 90:
+            remedy = "give map; or name the columns lon and lat, if they are degrees"
+        else:
+            remedy = f"give map; or, if they are metres, transform them ({TO_DEGREES}) and name them lon and lat"
+        return InputError("columns x, y", f"{x:.15g} and {y:.15g} are pixels, but of no map", remedy)
+    if found := [column for column in attributes if column in LIKELY_PLACES]:
+        remedy = f"name them lon and lat if they are degrees (WGS 84); transform them first if not ({TO_DEGREES})"
+        return InputError(f"columns {', '.join(found[:4])}", "are not read as a place, and there is no other", remedy)
+    return InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or use --unplaced")
 
 
 def _without_other_place(defaults: dict[str, Any], values: Mapping[str, Value]) -> dict[str, Any]:

@@ -46,7 +46,8 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
     base = Path(os.path.abspath(request.collection)).parent
     roots = Roots(base, Path(os.path.realpath(request.root or base)))
     with _folder(request.output, request.dry_run, request.overwrite) as folder:
-        batch = Batch(roots, folder, not request.resume, request.overwrite, request.unplaced)
+        target = folder if request.output is None else Path(os.path.abspath(request.output))
+        batch = Batch(roots, folder, not request.resume, request.overwrite, request.unplaced, target)
         spool = folder / WORK / "rows.jsonl"
         with atomic_path(spool) as partial:
             count, unknown = write_spool(tasks_of(read_rows(request.collection, request.layer), defaults), partial)
@@ -64,6 +65,8 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
                 tally.add(notice)
                 for watcher in watchers:
                     watcher.row(notice, tally)
+                if verbose > 1 and notice.trace is not None:
+                    log.debug("%s", notice.trace.rstrip())
                 if notice.full and not request.dry_run:
                     raise OutputError(folder, "the disk is full", "free some space and run the same command again")
                 if notice.lost and not request.dry_run:
@@ -72,7 +75,9 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
             log.info("%d rows: %d valid, %d invalid", count, count - tally.failed, tally.failed)
         else:
             title = request.title or request.collection.stem
-            summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
+            summary = summarise_apart(
+                Collection(folder, spool, tuple(unknown), title, request.visible_from, request.license)
+            )
             _log_summary(folder, tally, summary)
             if summary.figures and (note := short_range_warning(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)
@@ -102,22 +107,14 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
     """Lock the output folder and yield it; for a dry run, yield a temporary folder."""
     from filelock import FileLock, Timeout
 
+    if output is not None:
+        check_output(output, overwrite)
     if dry_run or output is None:
         with tempfile.TemporaryDirectory(prefix="fig2mesh-") as name:
             (Path(name) / WORK).mkdir()
             yield Path(name)
         return
     folder = Path(os.path.abspath(output))
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(output, "not a directory", "give -o a folder")
-    if not (folder / WORK).is_dir() and not overwrite:
-        for name in TAKEN:
-            if (folder / name).exists():
-                raise OutputError(
-                    folder / name,
-                    "already exists, and is not from an earlier batch",
-                    "use --overwrite or choose another -o DIR",
-                )
     try:
         (folder / WORK).mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / WORK / "lock", timeout=0)
@@ -128,6 +125,26 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
             yield folder
     except Timeout:
         raise OutputError(output, "another batch is writing there", "wait for it, or choose another -o DIR") from None
+
+
+def check_output(output: Path, overwrite: bool) -> None:
+    """Raise OutputError for a folder that a batch cannot write into; the same for a run and a dry run."""
+    folder = Path(os.path.abspath(output))
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(output, "not a directory", "give -o a folder")
+    above = next(each for each in (folder, *folder.parents) if each.exists())
+    if not above.is_dir():
+        raise OutputError(output, f"{above} is not a directory", "give -o a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise OutputError(output, f"no permission to write in {above}", "choose another -o DIR")
+    if not (folder / WORK).is_dir() and not overwrite:
+        for name in TAKEN:
+            if (folder / name).exists():
+                raise OutputError(
+                    folder / name,
+                    "already exists, and is not from an earlier batch",
+                    "use --overwrite or choose another -o DIR",
+                )
 
 
 def _log_unknown(unknown: dict[str, int]) -> None:

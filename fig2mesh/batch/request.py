@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
@@ -66,6 +67,12 @@ class BatchRequest:
     title: str | None = option(
         default=None, metavar="TEXT", help="Title of the STAC catalogue. Default: COLLECTION without its suffix."
     )
+    license: str | None = option(
+        default=None,
+        metavar="SPDX|URL",
+        help="License of the figures in the STAC catalogue: an SPDX identifier such as CC-BY-4.0, or the address of "
+        "its text.",
+    )
     visible_from: float | None = option(
         default=None,
         metavar="M",
@@ -84,6 +91,12 @@ class BatchRequest:
             raise InputError("--address", "requires --engine dask", "add --engine dask")
         if self.output is None and not self.dry_run:
             raise InputError("-o", "no output folder", "give -o DIR")
+        if self.license is not None and not re.fullmatch(r"https?://\S+|[\w.+-]+", self.license, re.ASCII):
+            raise InputError(
+                "--license",
+                f"{self.license[:40]!r} is neither an SPDX identifier nor an address",
+                "give one such as CC-BY-4.0, or https://…",
+            )
         if self.root is not None and not self.root.is_dir():
             raise InputError(
                 "--root", f"no such directory {self.root}", "name a folder that contains the collection's files"

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fig2mesh.batch.columns import no_place
 from fig2mesh.batch.row_files import digest_of, files_unchanged, input_files, resolve, sheet_files
 from fig2mesh.batch.task import Batch, RowTask
 from fig2mesh.conversion.request import PlaceRequest, Request
@@ -40,8 +41,8 @@ class ResolvedRow:
             time_span(task.date, "column date")
         resolved = resolve(task.request, batch.roots, task.own_files)
         self.request: Request = replace(resolved, outputs=self.targets)
-        if not (resolved.has_place or batch.unplaced):
-            raise InputError("columns lon, lat", "no place", "give lon and lat, or map, x and y; or use --unplaced")
+        if not resolved.has_place and (resolved.at is not None or not batch.unplaced):
+            raise no_place(resolved, task.attributes)
         files = input_files(resolved)
         self.inputs: dict[str, str] = {
             self._relative(file): digest_of(file) for name in sorted(files) for file in files[name]
@@ -59,6 +60,13 @@ class ResolvedRow:
     def _relative(self, file: Path) -> str:
         real, root = Path(os.path.realpath(file)), self.batch.roots.root
         return (real.relative_to(root) if real.is_relative_to(root) else real).as_posix()
+
+    @property
+    def source(self) -> str:
+        """The picture as the table names it, so that it can be found again; no folders of this machine."""
+        assert self.task.request is not None
+        path = self.task.request.figure
+        return self._relative(self.request.figure) if path.is_absolute() else path.as_posix()
 
     def sheet(self) -> MapSheet | None:
         """Map sheet of the place, if any. Raises InputError."""
@@ -96,8 +104,14 @@ class ResolvedRow:
 
     def check_values(self) -> None:
         """Check everything that needs no reading of the figure. Raises InputError."""
+        from fig2mesh.conversion.place import is_drawn_on
+
         self.profile()
-        self.sheet()
+        sheet, at = self.sheet(), self.request.at
+        if sheet is not None:
+            is_drawn_on(sheet, at, self.request.figure)
+        if sheet is not None and at is not None:
+            sheet.place(*at, source="columns x, y")
 
     def check(self) -> None:
         """Check the values, and read the given files of the figure. Raises InputError."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from collections.abc import Collection
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from exporters.file_digest import sha256_of
+from fig2mesh.batch.path_text import located, nearest_name
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
@@ -30,19 +32,25 @@ class Roots:
 
     def resolve(self, column: str, path: Path) -> Path:
         """Path of a file named in a row. Raises InputError if it is outside of `root`, also through links."""
-        whole, shown = self.base / path, str(path)[:120]
+        source, shown = f"column {column}", str(path)[:120]
         try:
+            whole = located(self.base, str(path), source)
             real = Path(os.path.realpath(whole, strict=False))
             if not real.is_relative_to(self.root):
                 straight = Path(os.path.normpath(whole)).is_relative_to(self.base)
                 found = f"{shown} is a link out of {self.root}" if straight else f"{shown} leads out of {self.root}"
-                raise InputError(f"column {column}", found, "move the file there, or use --root DIR")
+                if not real.exists():
+                    raise InputError(source, f"{found}, and does not exist", "check the path; see also --root DIR")
+                wider = os.path.commonpath([real.parent, self.root])
+                raise InputError(source, found, f"move the file there, or allow a wider folder with --root {wider}")
             if not stat.S_ISREG(os.stat(real).st_mode):
-                raise InputError(f"column {column}", f"{shown} is not a file", "check the path")
+                raise InputError(source, f"{shown} is not a file", "check the path")
         except OSError as error:  # also loops of links, and names that are too long
-            raise InputError(f"column {column}", f"{shown}: {error.strerror}", "check the path") from None
+            near = nearest_name(self.base, whole) if error.errno == errno.ENOENT else None
+            remedy = f"check the path (did you mean {near[:120]}?)" if near else "check the path"
+            raise InputError(source, f"{shown}: {error.strerror}", remedy) from None
         except ValueError as error:
-            raise InputError(f"column {column}", f"{shown!r} is not a path ({error})", "check the path") from None
+            raise InputError(source, f"{shown!r} is not a path ({error})", "check the path") from None
         return whole
 
     def shorten(self, text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -30,9 +31,9 @@ READ = "figure"
 MEASURES = "measures"
 """Name of the result of measuring the model, which takes longer than writing it."""
 
-UNKNOWN_DATE = "0001/9999"
-"""Date in the catalogue, which requires one. The modification time of a file is not that of the drawing, and copying
-changes it."""
+UNKNOWN_DATE = "1678/2261"
+"""Date in the catalogue, which requires one: all years that pandas can hold, in nanoseconds from 1970. The modification
+time of a file is not that of the drawing, and copying changes it."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -47,10 +48,15 @@ def check_row(batch: Batch, task: RowTask) -> Outcome:
     """Read all files of a row and report problems, without writing anything or running a network."""
     try:
         ResolvedRow(batch, task).check()
+        if batch.target is not None:
+            before = Ledger(batch.target).read(task.name) if (batch.target / WORK).is_dir() else None
+            check_free(batch.target / task.name, bool(before and before.get("claimed")), batch.overwrite)
     except InputError as error:
-        return Outcome(task.number, task.name, "failed", batch.roots.shorten(_line(error)))
+        line, trace = batch.roots.shorten(_line(error)), traceback.format_exc()
+        return Outcome(task.number, task.name, "failed", line, trace=trace)
     except Exception as error:
-        return Outcome(task.number, task.name, "failed", _line(error), internal=True)
+        line = f"internal error: {type(error).__name__}: {_line(error)}"
+        return Outcome(task.number, task.name, "failed", line, internal=True, trace=traceback.format_exc())
     return Outcome(task.number, task.name, "done")
 
 
@@ -96,7 +102,8 @@ def convert_row(batch: Batch, task: RowTask, advance: Advance = lambda stage: No
     except OSError as error:
         record |= {"status": "failed", "error": f"its record cannot be written ({error.strerror})"}
         record["full"] = error.errno in FULL
-    return _outcome(task, record)
+    trace = None if fault is None else "".join(traceback.format_exception(fault))
+    return replace(_outcome(task, record), trace=trace)
 
 
 def _outcome(task: RowTask, record: dict[str, Any], unchanged: bool = False) -> Outcome:
@@ -130,15 +137,20 @@ def _line(error: Exception) -> str:
     return " ".join(without_temporary(str(error)).split())[:500] or type(error).__name__
 
 
-def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) -> None:
-    """Record that the folder of a figure belongs to the batch, and remove temporary files of workers that died."""
-    target = batch.folder / task.name
+def check_free(target: Path, claimed: bool, overwrite: bool) -> None:
+    """Raise OutputError for the folder of a figure that the batch may not replace; claimed : whether it is its own."""
     if target.is_symlink():
         raise OutputError(target, "is a link", "remove it, or rename the figure")
-    if not record.get("claimed") and os.path.lexists(target) and not batch.overwrite:
+    if not claimed and os.path.lexists(target) and not overwrite:
         raise OutputError(
             target, "already exists, and is not from an earlier batch", "use --overwrite or choose another -o DIR"
         )
+
+
+def _claim(batch: Batch, task: RowTask, ledger: Ledger, record: dict[str, Any]) -> None:
+    """Record that the folder of a figure belongs to the batch, and remove temporary files of workers that died."""
+    target = batch.folder / task.name
+    check_free(target, bool(record.get("claimed")), batch.overwrite)
     record["claimed"] = True
     ledger.write(task.name, record)
     if target.is_dir():
@@ -185,7 +197,7 @@ def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance
     }
     if asset.placement is not None:
         contents = tuple(f"{task.name}/{name}" for name in _levels(row, asset))
-        whole = replace(figure_of(asset, contents), attributes=_plain(task.attributes))
+        whole = replace(figure_of(asset, contents), attributes=_plain(task.attributes), source=row.source)
         record["figure"] = asdict(whole)
     return record
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import multiprocessing
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
@@ -20,7 +19,11 @@ from fig2mesh.batch.tasks import read_spool
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
-MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
+MANIFEST, TILESET, GEOPACKAGE, LICENSE = "manifest.jsonl", "tileset.json", "index.gpkg", "license.txt"
+
+NO_LICENSE: Final = """The licence of these figures is not stated.
+Their attribution, where there is one, is the property "credit" of each item and figure.
+"""
 
 REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "notes")
 """Entries that the manifest copies from the record of a finished row."""
@@ -32,6 +35,7 @@ class Collection:
 
     folder : of the outputs; spool : of the tasks; columns : attributes of the user for the indexes, in order
     title : of the collection; visible_from_m : of the tileset, None to derive it from the height of each figure
+    license : SPDX identifier, or address of a text; None if it is not known
     """
 
     folder: Path
@@ -39,6 +43,7 @@ class Collection:
     columns: tuple[str, ...]
     title: str
     visible_from_m: float | None
+    license: str | None = None
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,9 @@ def summarise(collection: Collection) -> Summary:
 
     folder, ledger = collection.folder, Ledger(collection.folder)
     left = ledger.names()
-    digest = hashlib.sha256(json.dumps([collection.columns, collection.title, collection.visible_from_m]).encode())
+    digest = hashlib.sha256(
+        json.dumps([collection.columns, collection.title, collection.visible_from_m, collection.license]).encode()
+    )
     figures: list[PlacedFigure] = []
     dates: list[str] = []
     failed = unplaced = 0
@@ -95,7 +102,7 @@ def summarise(collection: Collection) -> Summary:
     from exporters.atomic_file import write_text, write_whole
 
     def fill(stage: Path) -> None:
-        _fill(stage, collection, figures, dates)
+        _fill(stage, collection, figures, dates, failed)
 
     outdated = [name for name in before["files"] if not Path(name).is_absolute() and ".." not in Path(name).parts]
     files = write_whole(folder, folder / MANIFEST, fill, overwrite=True, outdated=outdated)
@@ -106,8 +113,9 @@ def summarise(collection: Collection) -> Summary:
     return Summary(*counts, tuple(names), tuple(sorted(left)))
 
 
-def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Sequence[str]) -> None:
+def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Sequence[str], failed: int) -> None:
     """Write all files into an empty staging folder."""
+    from exporters.file_names import safe_name
     from exporters.gis.geopackage import write_geopackage
     from exporters.gis.stac import StacFile, StacItem, stac_file, write_stac
     from exporters.tiles.gather import write_tree
@@ -115,7 +123,7 @@ def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Se
     with (stage / MANIFEST).open("w", encoding="utf-8", newline="\n") as stream:
         for task, record in _records(collection):
             stream.write(json.dumps(_line(task, record), ensure_ascii=False, allow_nan=False) + "\n")
-    write_geopackage(figures, stage / GEOPACKAGE, failed=_failures(collection))
+    write_geopackage(figures, stage / GEOPACKAGE, failed=_failures(collection) if failed else None)
     if not figures:
         return
     write_tree(list(figures), stage, visible_from_m=collection.visible_from_m, name=TILESET)
@@ -131,8 +139,17 @@ def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Se
                 yield StacItem(figure, task.name, tuple(files), date)
 
     over = [stac_file(stage, name) for name in (TILESET, "index.geojson", GEOPACKAGE)]
-    identifier = re.sub(r"[^\w.-]+", "-", collection.title).strip("-.") or "figures"
-    write_stac(items(), stage, id=identifier, title=collection.title, files=over)
+    identifier = safe_name(collection.title, "-").strip("-") or "figures"
+    license, link = _license(stage, collection.license)
+    write_stac(items(), stage, id=identifier, title=collection.title, files=over, license=license, license_link=link)
+
+
+def _license(stage: Path, license: str | None) -> tuple[str, str | None]:
+    """License of the catalogue, and the link that STAC asks for where it has no SPDX identifier."""
+    if license is not None:
+        return ("other", license) if ":" in license else (license, None)
+    (stage / LICENSE).write_text(NO_LICENSE, encoding="utf-8", newline="\n")
+    return "other", f"./{LICENSE}"
 
 
 def _records(collection: Collection) -> Iterator[tuple[RowTask, dict[str, Any]]]:

@@ -16,6 +16,7 @@ class Batch:
 
     roots : of the input files; folder : of the outputs; fresh : ignore stored results
     overwrite : replace folders that are not from an earlier batch; unplaced : accept rows without a place
+    target : folder that a dry run checks instead of writing into `folder`
     """
 
     roots: Roots
@@ -23,6 +24,7 @@ class Batch:
     fresh: bool = False
     overwrite: bool = False
     unplaced: bool = False
+    target: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Outcome:
 
     status : done or failed; error : one line, None if done; internal : internal error, not a fault of the input
     lost : its worker could not record it; full : the disk is full; unchanged : the outputs were up to date
-    seconds : of work; ran, reused : stages; counts : work done, by kind
+    seconds : of work; ran, reused : stages; counts : work done, by kind; trace : traceback of a failure
     """
 
     number: int
@@ -81,3 +83,4 @@ class Outcome:
     ran: tuple[str, ...] = ()
     reused: tuple[str, ...] = ()
     counts: dict[str, int] = field(default_factory=dict)
+    trace: str | None = None

@@ -4,29 +4,39 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from exporters.tiles.tileset import safe_name
+from exporters.file_names import figure_name, name_key, safe_name
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.columns import attributes_of, request_of
 from fig2mesh.batch.row_files import FILE_FIELDS
 from fig2mesh.batch.task import Problem, RowTask
-from fig2mesh.conversion.fields import as_plain, list_of
+from fig2mesh.conversion.cells import date_of
+from fig2mesh.conversion.fields import as_plain, cell_text, list_of
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
 """Formats that a row may request; .glb is always made."""
 
-MAX_NAME: Final = 60
-"""Characters of a folder's name; file systems allow 255 bytes, and a character takes up to four."""
-
-TAKEN: Final = ("tileset.json", "index.geojson", "index.gpkg", "figures.czml", "collection.json", "manifest.jsonl")
+TAKEN: Final = (
+    "tileset.json",
+    "index.geojson",
+    "index.gpkg",
+    "figures.czml",
+    "collection.json",
+    "manifest.jsonl",
+    "license.txt",
+)
 """Names of files in the output folder, which no figure may have."""
+
+FURTHER: Final = re.compile(r"tileset_\d+\.json", re.IGNORECASE)
+"""Names of the further files of a large tileset."""
 
 
 class Names:
@@ -34,16 +44,21 @@ class Names:
 
     def __init__(self) -> None:
         self._table = sqlite3.connect("")
-        self._table.execute("create table names (name text primary key, row integer) without rowid")
-        self._table.executemany("insert into names values (?, 0)", [(name.casefold(),) for name in TAKEN])
+        self._table.execute("create table names (name text primary key, row integer, title text) without rowid")
+        self._table.executemany("insert into names values (?, 0, ?)", [(name, name) for name in map(name_key, TAKEN)])
 
-    def take(self, name: str, row: int) -> int | None:
-        """Reserve a name for a row; return the row that already has it, if any (0: a file of the batch)."""
-        # Some file systems do not distinguish Anna and anna.
-        found = self._table.execute("select row from names where name = ?", (name.casefold(),)).fetchone()
+    def take(self, name: str, row: int, title: str) -> tuple[int, bool] | None:
+        """Reserve the name of a folder for a row called `title`.
+
+        Returns the row that already has it, if any (0: a file of the batch), and whether that has the same title too.
+        """
+        if FURTHER.fullmatch(name):
+            return 0, True
+        key, whole = name_key(name), name_key(title).encode("utf-8", "replace")
+        found = self._table.execute("select row, title from names where name = ?", (key,)).fetchone()
         if found is not None:
-            return int(found[0])
-        self._table.execute("insert into names values (?, ?)", (name.casefold(), row))
+            return int(found[0]), found[0] == 0 or found[1] == whole
+        self._table.execute("insert into names values (?, ?, ?)", (key, row, whole))
         return None
 
     def close(self) -> None:
@@ -65,13 +80,14 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     values = row.values
     problem = None if row.problem is None else _problem(row.where, row.problem)
     given = values.get("name")
-    title = (
-        str(given) if given is not None else PurePosixPath(str(values.get("figure", ""))).stem or f"row {row.number}"
-    )
-    wanted = safe_name(title)[:MAX_NAME].strip(".") or "figure"
+    picture = PurePosixPath(str(values.get("figure", "")).replace("\\", "/"))
+    title = cell_text(given) if given is not None else figure_name(picture) or f"row {row.number}"
+    wanted = safe_name(title)
     name, number = wanted, 1
-    while (other := names.take(name, row.number)) is not None:
-        if given is not None and problem is None:
+    while (taken := names.take(name, row.number, title)) is not None:
+        other, same = taken
+        # Names that differ, but not in characters that a file can have, such as "?" and "!", get numbers.
+        if given is not None and problem is None and same:
             whose = f"also that of row {other}" if other else "that of a file of the batch"
             problem = _problem(row.where, f"its name {name} is {whose}; give each row a unique name")
         number += 1
@@ -98,7 +114,7 @@ def make_task(row: Row, name: str, title: str, defaults: Mapping[str, Any], prob
         title,
         request,
         formats,
-        None if date is None else str(date),
+        None if date is None else date_of(date),
         attributes_of(values),
         tuple(field for field in FILE_FIELDS if field in values),
         problem,

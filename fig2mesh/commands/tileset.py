@@ -11,6 +11,9 @@ from fig2mesh.commands.options import FILE, messages, request_options
 from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.terminal import configure_logging, log
 
+MAX_NOTES = 10
+"""Figures that are there twice, named one by one."""
+
 
 @request_class
 class TilesetRequest:
@@ -58,6 +61,10 @@ def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verb
         overwrite=request.overwrite,
         link=request.link,
     )
+    for line in written.notes[:MAX_NOTES]:
+        log.warning("%s", line)
+    if len(written.notes) > MAX_NOTES:
+        log.warning("%d more figures are there twice", len(written.notes) - MAX_NOTES)
     if note := short_range_warning(request.visible_from, written.tallest_m):
         log.warning("%s", note)
     log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))

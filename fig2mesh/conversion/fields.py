@@ -13,6 +13,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast, dataclass_transform, get_args, get_origin, get_type_hints
 
+from fig2mesh.conversion.cells import FALSE, TRUE, NotNumber, number_of, whole_number_of
 from fig2mesh.errors import InputError
 
 T = TypeVar("T")
@@ -212,7 +213,7 @@ def parse_value(field: RequestField, raw: object, source: str) -> Any:
 
 
 def _parse_item(field: RequestField, raw: object, source: str) -> Any:
-    kind, text = field.type.kind, _text(raw)
+    kind, text = field.type.kind, cell_text(raw)
     if kind is bool:
         return _truth(raw, source)
     if kind is Path:
@@ -220,20 +221,20 @@ def _parse_item(field: RequestField, raw: object, source: str) -> Any:
     if kind is str:
         return text
     try:
-        return kind(text)
-    except ValueError:
-        name = "a whole number" if kind is int else "a number"
-        raise InputError(source, f"{text[:40]!r} is not {name}", f"give {name}") from None
+        return whole_number_of(text.strip(), text[:40]) if kind is int else number_of(text.strip(), text[:40])
+    except NotNumber as error:
+        raise InputError(source, error.finding, error.remedy) from None
 
 
 def list_of(raw: object) -> list[str]:
     """Items of a list, or of a text in which spaces, commas or semicolons separate them."""
     if isinstance(raw, tuple | list):
-        return [_text(item) for item in raw]
-    return _text(raw).replace(",", " ").replace(";", " ").split()
+        return [cell_text(item) for item in raw]
+    return cell_text(raw).replace(",", " ").replace(";", " ").split()
 
 
-def _text(raw: object) -> str:
+def cell_text(raw: object) -> str:
+    """Text of a cell; whole numbers without a point."""
     if isinstance(raw, float) and raw.is_integer() and abs(raw) < 2**53:
         return str(int(raw))  # tables keep whole numbers as floats, where one of them is missing
     return repr(raw) if isinstance(raw, float) else str(raw)
@@ -241,9 +242,9 @@ def _text(raw: object) -> str:
 
 def _truth(raw: object, source: str) -> bool:
     text = str(raw).strip().lower()
-    if text in ("1", "1.0", "true", "yes", "on"):
+    if text in TRUE:
         return True
-    if text in ("0", "0.0", "false", "no", "off"):
+    if text in FALSE:
         return False
     raise InputError(source, f"{text[:40]!r} is not a truth value", "give true or false")
 

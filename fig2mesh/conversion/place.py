@@ -90,15 +90,12 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
         return Placed(placement_of(request), FIGURE_HEIGHT if request.height_m is None else request.height_m)
     from fig2mesh.asset_frame import foot_on_picture, height_on_picture
 
-    drawn_on_it = sheet.picture is not None and path.exists() and path.samefile(sheet.picture)
+    drawn_on_it = is_drawn_on(sheet, request.at, path)
     notes = list(sheet.notes)
     if request.at is not None:
         pixel, source = request.at, "--at"
-    elif drawn_on_it:
-        pixel, source = foot_on_picture(figure), f"{path}: the feet"
     else:
-        found = f"{path.name} is not the picture of {sheet.file.name}"
-        raise InputError("--map", found, "give --at X Y, the pixel of the sheet where the feet are")
+        pixel, source = foot_on_picture(figure), f"{path}: the feet"
     location = sheet.place(*pixel, source=source)
     notes += location.notes
     height = FIGURE_HEIGHT if request.height_m is None else request.height_m
@@ -110,6 +107,15 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
     placement = placement_of(request, lonlat, height=height, viewer_deg=location.down_bearing_deg)
     record = _record(request, sheet, location, pixel)
     return Placed(placement, height, record, tuple(notes), _summary(sheet, location))
+
+
+def is_drawn_on(sheet: MapSheet, at: tuple[float, float] | None, path: Path) -> bool:
+    """Whether a figure's picture is the sheet itself. Raises InputError if it is not, and --at is missing."""
+    drawn_on_it = sheet.picture is not None and path.exists() and path.samefile(sheet.picture)
+    if at is None and not drawn_on_it:
+        found = f"{path.name} is not the picture of {sheet.file.name}"
+        raise InputError("--map", found, "give --at X Y, the pixel of the sheet where the feet are")
+    return drawn_on_it
 
 
 def clamp_note(request: PlaceRequest, targets: Sequence[str]) -> str | None:

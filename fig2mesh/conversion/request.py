@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, Literal
 
+from exporters.file_names import figure_name
 from exporters.text import plain_text
 from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.errors import InputError
@@ -189,7 +190,8 @@ class OutputOptions:
         default=None,
         metavar="TEXT",
         shared=False,
-        help="Name of the figure in the outputs. Default: FIGURE without its suffix.",
+        help="Name of the figure in the outputs. Default: FIGURE without its suffix; its folder, if that is only "
+        "'image', 'IMG_0001' or the like.",
     )
     outputs: tuple[str, ...] = option(
         default=(),
@@ -198,8 +200,8 @@ class OutputOptions:
         metavar="OUT",
         column=False,
         help="Output file: .glb .gltf .usda .usdc .usdz .ply .obj .czml .geojson; or a folder or tileset.json for "
-        "3D Tiles; .png or .jpg: a picture of the model. Repeatable. Default: FIGURE with the suffix .glb, in the "
-        "current folder.",
+        "3D Tiles; .png or .jpg: a picture of the model. Repeatable. Default: the figure's default name with the "
+        "suffix .glb, in the current folder.",
     )
     profile: ProfileName | None = option(
         default=None,
@@ -251,12 +253,12 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
     @property
     def targets(self) -> tuple[str, ...]:
         """The outputs, or the default output if none is named."""
-        return self.outputs or (plain_text(self.figure.stem) + ".glb",)
+        return self.outputs or (plain_text(figure_name(self.figure.absolute())) + ".glb",)
 
     @property
     def title(self) -> str:
         """Name of the figure."""
-        return self.name or self.figure.stem
+        return self.name or figure_name(self.figure.absolute())
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -14,6 +14,8 @@ from exporters.atomic_file import write_whole
 from fig2mesh.parse.annotation import Annotation, on_whole_picture, save_annotation
 from fig2mesh.parse.joint_writers import as_coco
 from fig2mesh.parse.read import Reading
+from fig2mesh.parse.sheet_table import OVERVIEW, Point, link_sheet, overview, write_table
+from fig2mesh.records import ByteArray
 
 if TYPE_CHECKING:
     from fig2mesh.parse.sheet import SheetFigure
@@ -23,15 +25,27 @@ FIGURES = "figures.json"
 
 
 def write_sheet(
-    folder: Path, figures: Sequence[SheetFigure], sheet: str, size: tuple[int, int], kind: str, overwrite: bool
+    folder: Path,
+    figures: Sequence[SheetFigure],
+    sheet: Path,
+    rgb: ByteArray,
+    kind: str,
+    overwrite: bool,
+    feet: Sequence[Point] | None = None,
+    beside: Sequence[Path] = (),
 ) -> list[str]:
-    """Write figures.json, which is COCO, and a folder of annotations for each figure; all or none.
+    """Write figures.json, which is COCO, a folder of annotations for each figure, the table and the overview; all or
+    none.
 
-    In such a folder mask and part labels are as large as the figure's box, joints are in pixels of the sheet.
+    In such a folder mask and part labels are as large as the figure's box, joints are in pixels of the sheet. Without
+    figures there is only figures.json.
 
-    sheet, size : file name and (width, height) of the sheet; kind : of the joints files
+    rgb : (H, W, 3) the sheet; kind : of the joints files
+    feet : pixel of the sheet where each figure stands; None if the sheet is no map
+    beside : files of the sheet that may hold its georeference
     returns : names of the folders
     """
+    size = (rgb.shape[1], rgb.shape[0])
     digits = max(2, len(str(len(figures))))
     names = [f"figure_{number:0{digits}d}" for number in range(1, len(figures) + 1)]
 
@@ -42,8 +56,12 @@ def write_sheet(
                 found.mask, found.joints_px, found.visible, found.part_labels, confidence=found.confidence
             )
             (stage / name).mkdir()
-            save_annotation(stage / name, inside, sheet, kind, size, figure.bbox[:2])
-        text = json.dumps(coco_of(figures, names, size, sheet), indent=1, ensure_ascii=False)
+            save_annotation(stage / name, inside, sheet.name, kind, size, figure.bbox[:2])
+        if figures:
+            linked = link_sheet(folder, stage, sheet, beside)
+            write_table(stage, names, figures, linked, feet)
+            overview(rgb, figures).save(stage / OVERVIEW, quality=85)
+        text = json.dumps(coco_of(figures, names, size, sheet.name), indent=1, ensure_ascii=False)
         (stage / FIGURES).write_text(text + "\n", encoding="utf-8")
 
     write_whole(folder, folder / FIGURES, fill, overwrite)

@@ -19,13 +19,13 @@ from fig2mesh.batch.collections.rows import (
     FIGURE,
     MAX_RECORD,
     MAX_TEXT,
-    InvalidValue,
     Row,
     check_columns,
     column_name,
     make_row,
-    shown,
+    unnamed_value,
 )
+from fig2mesh.batch.collections.values import InvalidValue, shown
 from fig2mesh.errors import InputError
 
 SEPARATORS = ",;\t"
@@ -174,9 +174,13 @@ def _misfit(names: Sequence[str], cells: Sequence[str]) -> InvalidValue | None:
             "quote cells that contain the separator" if count > len(names) else "give all cells, including empty ones"
         )
         return InvalidValue(f"{count} cells under {len(names)} headings", remedy)
-    for name, cell in zip(names, cells, strict=False):
-        if not name and cell.strip():
-            return InvalidValue(f"{shown(cell)!r} under an empty heading", "name the column")
+    first = next((index for index, name in enumerate(names) if name), 0)
+    for index, (name, cell) in enumerate(zip(names, cells, strict=False)):
+        if name or not cell.strip():
+            continue
+        # Only leading columns hold numbers of rows.
+        if index >= first or unnamed_value(cell):
+            return InvalidValue(f"{shown(cell.strip())!r} under an empty heading", "name the column")
     return None
 
 

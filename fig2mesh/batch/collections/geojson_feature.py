@@ -17,14 +17,13 @@ from fig2mesh.batch.collections.rows import (
     MAX_NESTING,
     MAX_RECORD,
     MAX_TEXT,
-    InvalidValue,
-    Point,
     Row,
     column_name,
     fit,
     make_row,
-    shown,
+    unnamed_value,
 )
+from fig2mesh.batch.collections.values import InvalidValue, Point, shown
 
 Event = tuple[str, Any]
 Events = Iterator[Event]
@@ -181,7 +180,8 @@ def _properties(events: Events, found: dict[str, object]) -> InvalidValue | None
             value = value if len(value) <= MAX_TEXT else TEXT
         name = column_name(key)
         if not name:
-            value = InvalidValue("property without a name", "name it") if value is not None else None
+            unnamed = value is not None and not (key.strip() and unnamed_value(value) is None)
+            value = InvalidValue("property without a name", "name it") if unnamed else None
         found[name] = TWICE if name in found else value
     return problem
 

@@ -23,7 +23,8 @@ from fig2mesh.batch.collections.geojson_feature import (
     read_feature,
     skip,
 )
-from fig2mesh.batch.collections.rows import MAX_NESTING, InvalidValue, Row, make_row, shown
+from fig2mesh.batch.collections.rows import MAX_NESTING, Row, make_row
+from fig2mesh.batch.collections.values import InvalidValue, shown
 from fig2mesh.errors import InputError
 
 MAX_LINE = 1 << 24
@@ -157,14 +158,23 @@ def _document(path: Path, stream: BinaryIO, start: int) -> Iterator[Row]:
                 top.member(key, events)
                 if key == "type" and top.kind not in ("FeatureCollection", "Feature"):
                     raise InputError(path, f"type {shown(top.kind)}", "give a GeoJSON FeatureCollection")
-            if key in ("crs", "features"):
+            if key in ("crs", "features", "annotations"):
                 top.members.add(key)
     except NotJson as error:
         raise InputError(path, f"{f'after feature {number}, ' if number else ''}not JSON ({error})", JSON) from None
     if "features" not in top.members:
+        if "annotations" in top.members:
+            raise InputError(path, "is a COCO file of annotations, not a collection", _instead_of_coco(path))
         if top.kind != "Feature":
             raise InputError(path, "no features", "give a GeoJSON FeatureCollection")
         yield top.row(1, "feature 1")
+
+
+def _instead_of_coco(path: Path) -> str:
+    beside = path.with_name("figures.csv")
+    if beside.is_file():
+        return f"give {beside.name}, the table beside it"
+    return "give a table; fig2mesh parse --all writes one, figures.csv"
 
 
 def _crs(events: Events) -> str | None:

@@ -20,14 +20,12 @@ from fig2mesh.batch.collections.rows import (
     FIGURE,
     MAX_RECORD,
     MAX_TEXT,
-    InvalidValue,
-    Point,
     Row,
     check_columns,
     column_name,
     make_row,
-    shown,
 )
+from fig2mesh.batch.collections.values import InvalidValue, Point, shown
 from fig2mesh.errors import InputError
 
 LAYERS = ("features", "attributes", "aspatial")
@@ -202,7 +200,7 @@ def _describe(connection: sqlite3.Connection, table: str) -> _Layer:
     fid = keys[0] if len(keys) == 1 else None
     columns = []
     for name, kind, _, hidden in listed:
-        if hidden != 1 and name not in (fid, geometry) and _writable(name):
+        if hidden != 1 and name not in (fid, geometry) and _writable(name) and column_name(name):
             columns.append((name, column_name(name), str(kind).upper() == "BOOLEAN"))
     if geometry not in [name for name, *_ in listed]:
         geometry = None

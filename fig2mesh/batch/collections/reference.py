@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from fig2mesh.batch.collections.rows import InvalidValue, Point, shown
+from fig2mesh.batch.collections.values import InvalidValue, Point, shown
 
 HAND = "give columns lon and lat"
 

@@ -1,8 +1,9 @@
 """Rows of a collection, whatever kind of file they come from, and their permitted values.
 
 Names of columns are lower case and stripped, and `-` counts as `_`: `height-m` and `Height_M` are one name.
-`longitude` and `lng` are read as `lon`, `latitude` as `lat`; `x` and `y` are pixels, never degrees. Texts are
-stripped; empty ones count as absent. `lon`, `lat`, `x` and `y` are numbers in every kind of file.
+Synonyms of `lon` and `lat` are those of `SYNONYMS`; `x` and `y` are pixels, never degrees. Texts are stripped; empty
+ones count as absent, and so do `nan`, `NULL` and the like, see `fig2mesh.conversion.cells.ABSENT`. `lon`, `lat`, `x`
+and `y` are numbers in every kind of file. A column of WKT is the place of a row that has no other.
 """
 
 from __future__ import annotations
@@ -14,21 +15,35 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TypeAlias
 
+from fig2mesh.batch.collections.values import InvalidValue, Point, shown
+from fig2mesh.batch.collections.wkt import WKT_COLUMNS, is_geometry, wkt_point
+from fig2mesh.conversion.cells import ABSENT, NotNumber, number_of
 from fig2mesh.errors import InputError
 
 Value: TypeAlias = "str | int | float | bool | tuple[Value, ...]"
 
 FIGURE = "figure"
 
-SYNONYMS = {"longitude": "lon", "lng": "lon", "latitude": "lat"}
+SYNONYMS = {
+    "longitude": "lon",
+    "lng": "lon",
+    "lon_deg": "lon",
+    "decimallongitude": "lon",
+    "latitude": "lat",
+    "lat_deg": "lat",
+    "decimallatitude": "lat",
+}
 
 NUMBERS = ("lon", "lat", "x", "y")
 """Columns that are numbers in every kind of file, even where they are written as text."""
 
+NOT_AVAILABLE = ("NA", "N/A", "#N/A", "n/a", "-", "?")
+"""Texts that count as absent in `NUMBERS`; in other columns they may have a meaning, as the country NA has."""
+
 PATHS = ("figure", "map")
 """Columns that must be texts if present."""
 
-PLACES = ("lon", "lat", "map")
+PLACES = ("lon", "lat", "lonlat", "map")
 """Columns of a place. A row that has one of them does not use its geometry."""
 
 MAX_ROWS = 1_000_000
@@ -52,11 +67,8 @@ MAX_ITEMS = 1_000
 MAX_INTEGER = 1 << 64
 """Identifiers of 64 bits are the largest integers that programs write."""
 
-SHOWN = 40
-"""Characters of a value in messages."""
-
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?", re.ASCII)
 _SURROGATE = re.compile("[\ud800-\udfff]")
+_UNNAMED = re.compile(r"unnamed: [0-9]+([._][0-9]+)*(_level_[0-9]+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,41 +88,11 @@ class Row:
     problem: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
-    """Location of a geometry: WGS 84 degrees; altitude in metres, None where it has none."""
-
-    lon: float
-    lat: float
-    altitude: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class InvalidValue:
-    """Stands in for a value, geometry or row that cannot be used."""
-
-    finding: str
-    remedy: str
-
-    def __str__(self) -> str:
-        return f"{self.finding}; {self.remedy}"
-
-    def in_column(self, name: str) -> InvalidValue:
-        """The same problem, with the name of its column."""
-        return InvalidValue(f"{shown(name)}: {self.finding}", self.remedy)
-
-
-def shown(value: object, most: int = SHOWN) -> str:
-    """A value as text for messages: short, and always in one line."""
-    text = value if isinstance(value, str) else repr(value)
-    text = text if len(text) <= most else text[: most - 1] + "…"
-    return text if text.isprintable() else repr(text)[1:-1]
-
-
 def column_name(text: str) -> str:
     """Name of a column, normalised as in `Row.values`."""
     name = text.strip().lower().replace("-", "_")
-    return SYNONYMS.get(name, name)
+    # What pandas calls a column that had no name when it read it.
+    return "" if _UNNAMED.fullmatch(name) else SYNONYMS.get(name, name)
 
 
 def check_columns(source: object, names: Sequence[str]) -> None:
@@ -135,6 +117,8 @@ def fit_text(text: str) -> str | InvalidValue | None:
     if len(text) > MAX_TEXT:
         return InvalidValue(f"more than {MAX_TEXT:,} characters", "give a shorter text")
     text = text.strip()
+    if text in ABSENT:
+        return None
     if not text.isascii() and _SURROGATE.search(text):
         return InvalidValue("bytes that are not UTF-8", "save the text as UTF-8")
     if "\0" in text:
@@ -168,13 +152,17 @@ def fit(value: object) -> Value | InvalidValue | None:
 def _number(value: Value) -> float | InvalidValue:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    if isinstance(value, str):
-        if _NUMBER.fullmatch(value):
-            number = float(value)
-            return number if math.isfinite(number) else InvalidValue("not a finite number", "leave it empty")
-        if _NUMBER.fullmatch(value.replace(",", ".")):
-            return InvalidValue(f"{shown(value)!r} has a comma", "write a decimal point")
-    return InvalidValue(f"{shown(value)!r} is not a number", "give a number with a decimal point")
+    try:
+        return number_of(str(value), shown(value))
+    except NotNumber as error:
+        return InvalidValue(error.finding, error.remedy)
+
+
+def unnamed_value(value: object) -> InvalidValue | None:
+    """Problem of a value without the name of a column; none with row numbers, which pandas and R write by default."""
+    if value is None or re.fullmatch(r"\s*[0-9]*(\.0)?\s*", str(value)):
+        return None
+    return InvalidValue(f"{shown(value)!r} under an empty heading", "name the column")
 
 
 def make_row(
@@ -191,9 +179,9 @@ def make_row(
     point : returns the location of its geometry; called only if the values name no place
     """
     values: dict[str, Value] = {}
-    for name, raw in found:
+    for name, raw in _with_long(found):
         value = fit(raw)
-        if value is None:
+        if value is None or (name in NUMBERS and value in NOT_AVAILABLE):
             continue
         if name in NUMBERS and not isinstance(value, InvalidValue):
             value = _number(value)
@@ -204,7 +192,7 @@ def make_row(
         else:
             values[name] = value
     if problem is None and not any(name in values for name in PLACES):
-        place = point()
+        place = point() or _geometry_in(values)
         if isinstance(place, InvalidValue):
             problem = place
         elif place is not None:
@@ -214,3 +202,24 @@ def make_row(
     if problem is None and FIGURE not in values:
         problem = InvalidValue(f"no {FIGURE}", f"give the path of its picture as {FIGURE}")
     return Row(number, where, values, None if problem is None else str(problem))
+
+
+def _with_long(found: Iterable[tuple[str, object]]) -> Iterable[tuple[str, object]]:
+    """Values of a row; `long` beside `lat` is its longitude, and by itself a column like any other."""
+    pairs = list(found)
+    names = {name for name, _ in pairs}
+    beside = "lat" in names and "lon" not in names
+    return [("lon" if beside and name == "long" else name, value) for name, value in pairs]
+
+
+def _geometry_in(values: dict[str, Value]) -> Point | InvalidValue | None:
+    """Point of the first column of geometries in a row, which is removed from its values; None without one."""
+    for name in WKT_COLUMNS:
+        text = values.get(name)
+        if isinstance(text, str) and (name == "wkt" or is_geometry(text)):
+            place = wkt_point(text)
+            if isinstance(place, InvalidValue):
+                return place.in_column(name)
+            del values[name]
+            return place
+    return None

@@ -298,3 +298,11 @@ def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.
         tracemalloc.stop()
     assert peaks[1] < 1.25 * peaks[0]
     assert peaks[1] < 3_000_000
+
+
+def test_the_version_is_one_that_old_readers_know(tmp_path: Path) -> None:
+    write_geopackage(many(3), tmp_path / "a.gpkg", failed=[(1, "x", "e")])
+    with closing(sqlite3.connect(tmp_path / "a.gpkg")) as database:
+        ((version,),) = database.execute("PRAGMA user_version")
+        ((application,),) = database.execute("PRAGMA application_id")
+    assert (version, application) == (10200, int.from_bytes(b"GPKG"))

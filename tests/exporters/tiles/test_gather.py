@@ -272,3 +272,25 @@ def test_the_command(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture
     assert main(["validate", str(out)]) == 0
     shutil.rmtree(out / "figures")
     assert main(["validate", str(out)]) == 2
+
+
+def test_a_figure_that_is_there_as_model_and_as_tileset_is_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    levels = (capsule(12, 2), capsule(8, 2))
+    write(asset(ZURICH, lods=levels, name="farmer"), tmp_path / "in" / "farmer.glb")
+    write(asset(ZURICH, lods=levels, name="farmer"), tmp_path / "in" / "farmer_tiles")
+    assert main(["tileset", str(tmp_path / "in"), "-o", str(tmp_path / "out")]) == 0
+    note, *_ = capsys.readouterr().err.splitlines()
+    assert note.endswith("farmer_tiles/farmer.glb, farmer; left out")
+    assert "in/farmer.glb: the same figure as" in note
+    assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} == {"farmer.glb", "farmer_lod1.glb"}
+
+
+def test_other_figures_in_one_spot_are_kept_and_noted(tmp_path: Path) -> None:
+    for number, columns in enumerate((8, 10)):
+        write(asset(ZURICH, lods=(capsule(columns, 2),), name="farmer"), tmp_path / "in" / f"{number}.glb")
+    write(asset(replace(ZURICH, lon_deg=8.6), lods=SMALL, name="farmer"), tmp_path / "in" / "2.glb")
+    written = write_figures([tmp_path / "in"], tmp_path / "out")
+    assert written.figures == 3
+    assert written.notes == ("farmer: 2 figures of this name stand in one spot, and hide each other",)

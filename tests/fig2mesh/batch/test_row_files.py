@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,62 @@ def test_digests_follow_the_content(tmp_path: Path) -> None:
     assert digest_of(file) == first
     file.write_bytes(b"other")
     assert digest_of(file) != first
+
+
+@pytest.mark.parametrize("text", [r"pictures\a.png", r".\pictures\a.png", "pictures//./a.png"])
+def test_separators_of_windows_lead_to_the_same_file(roots: Roots, text: str) -> None:
+    assert roots.resolve("figure", Path(text)).samefile(roots.base / "pictures" / "a.png")
+
+
+def test_urls_of_files_are_paths(roots: Roots) -> None:
+    (roots.base / "pictures" / "my ä.png").write_bytes(b"b")
+    uri = (roots.base / "pictures" / "my ä.png").as_uri()
+    for text in (uri, uri.replace("file:///", "file:/"), uri.replace("file:///", "file://localhost/")):
+        assert roots.resolve("figure", Path(text)).read_bytes() == b"b"
+    with pytest.raises(InputError, match="leads out of"):
+        roots.resolve("figure", Path((roots.base.parent / "secret.png").as_uri()))
+
+
+@pytest.mark.parametrize(("stored", "written"), [("NFC", "NFD"), ("NFD", "NFC")])
+def test_names_may_be_composed_in_another_way_than_on_the_disk(roots: Roots, stored: str, written: str) -> None:
+    folder = roots.base / unicodedata.normalize(stored, "Zürich")
+    folder.mkdir()
+    (folder / unicodedata.normalize(stored, "Müller.png")).write_bytes(b"m")
+    text = unicodedata.normalize(written, "Zürich/Müller.png")
+    assert roots.resolve("figure", Path(text)).read_bytes() == b"m"
+
+
+def test_a_backslash_in_a_name_stays(roots: Roots) -> None:
+    (roots.base / r"pictures\a.png").write_bytes(b"own")
+    assert roots.resolve("figure", Path(r"pictures\a.png")).read_bytes() == b"own"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (r"C:\maps\a.png", "is a path of Windows, with a drive or a server; give the path relative to the folder"),
+        ("D:/maps/a.png", "is a path of Windows"),
+        ("file:///C:/maps/a.png", "is a path of Windows"),
+        (r"\\server\share\a.png", "is a path of Windows"),
+        ("https://example.org/a.png", "is a web address; download the file, and give its path"),
+        ("~/a.png", "begins with ~, which is not expanded in tables"),
+        ("pictures/b.png", "pictures/b.png: No such file or directory; check the path"),
+        ("pictures/A.PNG", "check the path (did you mean pictures/a.png?)"),
+        ("pictures/%61.png", "check the path (did you mean pictures/a.png?)"),
+        ("../nothing.png", ", and does not exist; check the path"),
+    ],
+)
+def test_other_paths_are_refused_for_the_true_reason(roots: Roots, text: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        roots.resolve("figure", Path(text))
+    assert message in str(caught.value)
+    assert str(caught.value).startswith("column figure: ")
+
+
+def test_the_folder_to_allow_is_named_and_works(roots: Roots) -> None:
+    secret = roots.base.parent / "secret.png"
+    with pytest.raises(InputError) as caught:
+        roots.resolve("figure", secret)
+    wider = Path(str(caught.value).rpartition("--root ")[2])
+    assert wider == roots.base.parent.resolve()
+    assert Roots(roots.base, wider).resolve("figure", secret).samefile(secret)

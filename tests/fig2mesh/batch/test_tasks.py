@@ -7,8 +7,9 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from exporters.file_names import MAX_NAME_CHARACTERS, name_key, safe_name
 from fig2mesh.batch.collections.rows import Row
-from fig2mesh.batch.tasks import MAX_NAME, TAKEN, read_spool, tasks_of, write_spool
+from fig2mesh.batch.tasks import TAKEN, read_spool, tasks_of, write_spool
 
 
 def _rows(*values: dict[str, object]) -> list[Row]:
@@ -41,7 +42,7 @@ def test_names_are_one_folder_each_and_stay_inside(values: list[dict[str, str]])
     for name in names:
         assert Path(name).parts == (name,)
         assert not name.startswith(".")
-        assert len(name) <= MAX_NAME + 5
+        assert len(name) <= MAX_NAME_CHARACTERS + 5
 
 
 @given(
@@ -60,3 +61,41 @@ def test_the_spool_gives_back_what_went_in(tmp_path_factory: object, values: lis
     assert count == len(values)
     assert list(read_spool(path)) == tasks
     assert all(column in value for column in unknown for value in [{c for v in values for c in v}])
+
+
+def test_names_that_differ_only_in_case_or_composition_are_the_same_name() -> None:
+    for one, other in (
+        ("Müller", "Mu\u0308ller"),
+        ("한글", "\u1112\u1161\u11ab\u1100\u1173\u11af"),
+        ("STRASSE", "Straße"),
+    ):
+        first, second = tasks_of(_rows({"name": one, "figure": "a.png"}, {"name": other, "figure": "a.png"}))
+        assert first.problem is None
+        assert "is also that of row 1; give each row a unique name" in str(second.problem)
+
+
+def test_names_that_no_folder_tells_apart_are_numbered() -> None:
+    names = ("who?", "who!", "who*", "CON", "con_")
+    tasks = list(tasks_of(_rows(*({"name": name, "figure": "a.png"} for name in names))))
+    assert [task.problem for task in tasks] == [None] * 5
+    assert [task.name for task in tasks] == ["who_", "who__2", "who__3", "CON_", "con__2"]
+    assert [task.title for task in tasks] == list(names)
+
+
+def test_pictures_called_image_are_named_after_their_folders() -> None:
+    figures = ("farmer/image.png", r"..\maps\monk\IMG_0001.JPG", "image.png", "images/image.png", "sheet/anna.png")
+    found = [task.name for task in tasks_of(_rows(*({"figure": each} for each in figures)))]
+    assert found == ["farmer", "monk", "image", "image_2", "anna"]
+
+
+@given(st.lists(st.text(max_size=80), max_size=12))
+@settings(max_examples=60)
+def test_no_two_rows_share_a_folder_on_any_file_system(names: list[str]) -> None:
+    found = [task.name for task in tasks_of(_rows(*({"name": name, "figure": "a"} for name in names)))]
+    assert len({name_key(name) for name in found}) == len(found)
+    assert all(safe_name(name) == name or name[-1].isdigit() for name in found)
+
+
+def test_further_files_of_the_tileset_are_not_names_of_figures() -> None:
+    (task,) = tasks_of(_rows({"name": "Tileset_01.json", "figure": "a.png"}))
+    assert "a file of the batch" in str(task.problem)

@@ -67,7 +67,8 @@ def test_two_people_on_a_sheet_are_found_and_become_models(tmp_path: Path) -> No
     document = json.loads((out / "figures.json").read_text())
     assert document["images"][0]["width"] == 760
     assert len(document["annotations"]) == 2
-    assert {folder.name for folder in out.iterdir()} == {"figures.json", "figure_01", "figure_02"}
+    made = {"figures.json", "figures.csv", "overview.jpg", "sheet.png", "figure_01", "figure_02"}
+    assert {folder.name for folder in out.iterdir()} == made
     for annotation in document["annotations"]:
         x, y, width, height = annotation["bbox"]
         box = (x, y, x + width, y + height)

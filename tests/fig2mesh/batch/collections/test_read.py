@@ -132,8 +132,8 @@ def test_one_bad_row_does_not_stop_the_others(folder, file):
     ("text", "finding"),
     [
         ("8,5", "lon: '8,5' has a comma; write a decimal point"),
-        ("8°30'", 'lon: "8°30\'" is not a number; give a number with a decimal point'),
-        ("nan", "lon: 'nan' is not a number; give a number with a decimal point"),
+        ("8°30'", 'lon: "8°30\'" is not a number; give a number with a decimal point, 8.5 if these are degrees'),
+        ("nan.", "lon: 'nan.' is not a number; give a number with a decimal point"),
         ("1e999", "lon: not a finite number; leave it empty"),
         ("1_0", "lon: '1_0' is not a number; give a number with a decimal point"),
         ("٣", "lon: '٣' is not a number; give a number with a decimal point"),
