@@ -26,8 +26,6 @@ than `DARK_THRESHOLD`."""
 MAX_LABEL_CELLS: Final = 320
 """Cells per side of the raster of part labels; the network's own raster is a third as fine."""
 
-REMEDY: Final = "inspect the files that `fig2mesh parse` writes, correct keypoints.json or mask.png, and pass them"
-
 
 @dataclass(frozen=True)
 class Inference:
