@@ -38,6 +38,9 @@ SURE_EXTENT: Final = 0.6
 MAX_EXTENT: Final = 2.5
 """Extent of the joints, shares of the silhouette's, as above; of the figures measured 0.78 to 0.94."""
 
+MIN_WHOLE: Final = 10
+"""Least number of joints whose extent is compared."""
+
 FITS: Final = 0.9
 """Share of changed joints inside the silhouette from which the change explains what is wrong."""
 
@@ -171,6 +174,8 @@ def joint_finding(
     inferred : the silhouette is inferred, which may be wrong itself
     """
     found = silhouette.fit(points)
+    if len(points) < MIN_WHOLE:  # a few joints may be of the upper half alone
+        found = Fit(found.inside, 1.0)
     corner = np.array(frame.corner, np.float64)
     if found.inside >= SURE_INSIDE and SURE_EXTENT <= found.extent <= MAX_EXTENT:
         return None
@@ -186,7 +191,7 @@ def joint_finding(
     if explained is not None:
         remedy = explained.remedy
     elif moved is not None:
-        remedy = f"shifted? add {moved[0]:.0f} to x and {moved[1]:.0f} to y, or {remedy}"
+        remedy = f"shifted? add about {moved[0]:.0f} to x and {moved[1]:.0f} to y, or {remedy}"
     understood = explained is not None or moved is not None
     least = MIN_INSIDE if not inferred else MIN_INSIDE / 2
     wrong = found.inside < least or (not inferred and not MIN_EXTENT <= found.extent <= MAX_EXTENT)

@@ -151,13 +151,15 @@ def _figure(
     person: LabelledPoints, path: Path, size: tuple[int, int] | None = None, picture: str | None = None
 ) -> NamedPoints:
     try:
-        chosen, unknown = meanings([name for name, *_ in person.points])
+        annotated = [point for point in person.points if point[1] is not None]
+        empty = [name for name, place, _ in person.points if place is None]
+        chosen, unknown = meanings([name for name, *_ in annotated], empty)
     except Repeated as error:
         raise FigureError(path, f"{error} twice", "keep one of each, or give each figure a group") from None
     points: dict[str, Point] = {}
     visible: dict[str, bool] = {}
     for point, index in chosen.items():
-        _, value, shown = person.points[index]
+        _, value, shown = annotated[index]
         points[point], visible[point] = position(value, point, path), shown
     if person.normalised and points and max(np.abs(value).max() for value in points.values()) <= MAX_SHARE:
         scale = person.size or size

@@ -119,14 +119,16 @@ class Repeated(ValueError):
     """Two points of one name."""
 
 
-def meanings(names: Sequence[str]) -> tuple[dict[str, int], tuple[str, ...]]:
+def meanings(names: Sequence[str], others: Sequence[str] = ()) -> tuple[dict[str, int], tuple[str, ...]]:
     """Points that the names of one figure stand for.
 
+    others : names of the same skeleton whose points have not been annotated
     returns : known point → index of the name that is preferred for it; names that stand for no point
 
     Raises Repeated where one name stands twice.
     """
-    bare = [split(name)[1] for name in names]
+    bare = [split(name)[1] for name in (*names, *others)]
+    absent = {canonical(name) for name in others}
     found: dict[str, tuple[int, int]] = {}
     unknown: list[str] = []
     for index, name in enumerate(names):
@@ -143,7 +145,7 @@ def meanings(names: Sequence[str]) -> tuple[dict[str, int], tuple[str, ...]]:
         for joint, tip in TIPS.items():
             # Only a point named hand or foot is where the limb's last part begins; toes and fingers are where it ends.
             at = chosen.get(side + tip)
-            if side + joint in chosen or at is None or bare[at] != tip:
+            if side + joint in chosen or side + joint in absent or at is None or bare[at] != tip:
                 continue
             chosen[side + joint] = at
             ends = [

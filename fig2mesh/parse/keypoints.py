@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, get_args
 from xml.etree import ElementTree
@@ -39,6 +39,7 @@ class Joints:
     visible : (21,) bool
     size : (width, height) of the picture they were drawn on, None where the file does not state it
     depth_order : as in `fig2mesh.records.Figure`
+    derived : joints that follow from others, or from points beside them
     missing : joints that the file has not, nor points that they follow from; their positions are those of a standing
         person with the other joints
     unknown : names in the file that stand for no joint
@@ -49,6 +50,7 @@ class Joints:
     visible: BoolArray
     size: tuple[int, int] | None = None
     depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
+    derived: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
     picture: str | None = None
@@ -57,6 +59,11 @@ class Joints:
     def annotated(self) -> BoolArray:
         """(21,) bool: joints that the file has, or that follow from its points."""
         return ~np.isin(JOINT_NAMES, self.missing)
+
+    @property
+    def drawn(self) -> BoolArray:
+        """(21,) bool: joints that the file itself has."""
+        return ~np.isin(JOINT_NAMES, (*self.missing, *self.derived))
 
 
 def read_keypoints(
@@ -112,7 +119,7 @@ def read_keypoints(
         there = {name: points[i].astype(np.float64) for i, name in enumerate(JOINT_NAMES) if name not in empty}
         named = NamedPoints(there, dict(zip(JOINT_NAMES, visible.tolist(), strict=True)), stated)
         joined = _from_names(named, path)
-        return Joints(joined.points_px, joined.visible, stated, order, joined.missing)
+        return replace(joined, depth_order=order)
     return Joints(points, visible, stated, order)
 
 
@@ -147,7 +154,8 @@ def _from_names(named: NamedPoints, path: Path) -> Joints:
         raise FigureError(path, found, remedy)
     joints = fitted(there)
     visible = np.array([named.visible.get(name, False) for name in JOINT_NAMES], np.bool_)
-    return Joints(joints, visible, named.size, {}, missing, named.unknown, named.picture)
+    derived = tuple(name for name in there if name not in named.points)
+    return Joints(joints, visible, named.size, {}, derived, missing, named.unknown, named.picture)
 
 
 def _not_annotated(value: object) -> bool:

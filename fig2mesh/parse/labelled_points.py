@@ -19,7 +19,7 @@ class NotThisFormat(Exception):
 class LabelledPoints:
     """Points of one figure as a file has them.
 
-    points : name as written, x and y (not checked yet), whether it is visible; points without annotation are left out
+    points : name as written, x and y (not checked yet; None where it has not been annotated), whether it is visible
     size : (width, height) of the picture; picture : its name or path as written; None where the file does not state it
     normalised : whether coordinates up to 1 are shares of the picture by the format's convention
     ignored : names of the format that stand for no joint of ours, such as the mouth's
@@ -72,9 +72,10 @@ def triples(names: tuple[str, ...], values: list[Any], scored: bool = False) -> 
     most = max(numbers, default=0)
     scores = scored or any(v != int(v) for v in numbers) or most > 2
     limit = MIN_VISIBLE * (100 if most > 2 else 1) if scores else 2
-    found = []
+    found: list[tuple[str, Any, bool]] = []
     for name, x, y, v in zip(names, values[0::3], values[1::3], marks, strict=False):
         if not v or (isinstance(v, int | float) and v <= 0):
+            found.append((name, None, False))
             continue
         found.append((name, [x, y], isinstance(v, int | float) and v >= limit))
     return tuple(found)

@@ -54,7 +54,7 @@ def openpose(content: Any, path: Path) -> list[LabelledPoints]:
 def results(content: Any, path: Path) -> list[LabelledPoints]:
     """Result lists of AlphaPose, MMPose, Detectron2 and pycocotools: a flat list of numbers for each figure."""
     found = [each for each in objects(content) if isinstance(each.get("keypoints"), list)]
-    if not isinstance(content, list) or not found or any("x" in point for point in objects(found[0]["keypoints"])):
+    if not isinstance(content, list) or not found or objects(found[0]["keypoints"]):
         raise NotThisFormat
     figures = []
     for each in found:
@@ -99,8 +99,7 @@ def landmarks(content: Any, path: Path) -> list[LabelledPoints]:
             found = f"{len(points)} points without names"
             raise FigureError(path, found, 'give each a "name", or all 33 landmarks of MediaPipe')
         named = tuple((label, *_point(point)) for label, point in zip(labels, points, strict=True))
-        shown = tuple((label, place, visible) for label, place, visible in named if place is not None)
-        figures.append(LabelledPoints(shown, size, picture, normalised, OTHER_POINTS))
+        figures.append(LabelledPoints(named, size, picture, normalised, OTHER_POINTS))
     return figures
 
 
@@ -127,10 +126,11 @@ def table(content: Any, path: Path) -> list[LabelledPoints]:
             place, visible = _point(dict(zip(("x", "y", "v"), value, strict=False)))
         elif name in known and value is not None:
             raise FigureError(path, f"{name} is {str(value)[:40]}", "give [x, y, visible] with finite numbers")
+        elif value is None:
+            place, visible = None, False
         else:
             continue
-        if place is not None:
-            points.append((str(name), place, visible))
+        points.append((str(name), place, visible))
     size = picture_size(content.get("width"), content.get("height"))
     return [LabelledPoints(tuple(points), size, text(content.get("file_name")), ignored=OTHER_POINTS)]
 

@@ -182,7 +182,7 @@ def read_given(
     if joints is not None:
         size = np.array(shape[::-1], np.float32)
         outside = ((joints.points_px < -JOINT_SLACK_PX) | (joints.points_px > size + JOINT_SLACK_PX)).any(axis=1)
-        outside &= joints.annotated
+        outside &= joints.drawn
         if outside.any():
             index = int(np.argmax(outside))
             x, y = joints.points_px[index]
@@ -228,7 +228,7 @@ def _notes(joints: Joints, picture: Path) -> Iterator[str]:
 
 
 def _check_coordinates(path: Path, joints: Joints, view: PictureView) -> None:
-    points = joints.points_px[joints.annotated] + np.array(view.corner, np.float32)
+    points = joints.points_px[joints.drawn] + np.array(view.corner, np.float32)
     _settled(path, [coordinate_finding(points, _frame(view))])
 
 
@@ -241,7 +241,7 @@ def _joint_findings(
     joints: Joints, silhouette: BoolArray, view: PictureView, inferred: bool = False
 ) -> Iterator[Finding | None]:
     outline = reduced(silhouette)
-    yield joint_finding(joints.points_px[joints.annotated], outline, _frame(view), inferred)
+    yield joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
     if not joints.missing:
         yield upright_finding(joints.points_px, outline)
         yield side_finding(joints.points_px, joints.visible)

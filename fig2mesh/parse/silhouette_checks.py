@@ -73,7 +73,7 @@ def edge_finding(rgba: ByteArray, mask: BoolArray) -> Finding | None:
             best, remedy = share, name
     share, (dx, dy) = _best_shift(edges, outline)
     if share > best + 0.02 and max(abs(dx), abs(dy)) > 0.02 * max(inner.shape):
-        best, remedy = share, f"shifted? move it by {dx * step} px in x and {dy * step} px in y"
+        best, remedy = share, f"shifted? move it by about {dx * step} px in x and {dy * step} px in y"
     if best < ON_EDGES or best < found + MIN_GAIN:
         return None
     text = f"{found:.0%} of the silhouette's outline follows edges of the picture"
@@ -85,8 +85,10 @@ def _best_shift(edges: BoolArray, outline: BoolArray) -> tuple[float, tuple[int,
     shape = [2 * length for length in edges.shape]
     product = np.fft.rfft2(edges, shape) * np.conj(np.fft.rfft2(outline, shape))
     found = np.fft.irfft2(product, shape)
-    row, column = np.unravel_index(int(found.argmax()), found.shape)
-    dy, dx = (int(v) - length if v > length // 2 else int(v) for v, length in zip((row, column), shape, strict=True))
+    # Edges are wider than the outline, so that several shifts near the right one are as good.
+    best = np.argwhere(found > found.max() - 0.5)
+    offsets = (best + np.array(shape) // 2) % np.array(shape) - np.array(shape) // 2
+    dy, dx = np.rint(np.median(offsets, axis=0)).astype(int).tolist()
     return float(found.max() / outline.sum()), (dx, dy)
 
 
