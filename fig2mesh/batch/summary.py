@@ -22,7 +22,7 @@ from georef.untrusted.json_file import parse_json
 
 MANIFEST, TILESET, GEOPACKAGE = "manifest.jsonl", "tileset.json", "index.gpkg"
 
-REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "notes")
+REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "score", "doubts", "notes")
 """Entries that the manifest copies from the record of a finished row."""
 
 

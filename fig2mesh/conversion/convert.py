@@ -21,6 +21,7 @@ from fig2mesh.conversion.request import Request
 from fig2mesh.conversion.runner import Inputs, Results, Runner
 from fig2mesh.conversion.stores import FolderStore, NoStore, Store
 from fig2mesh.errors import InputError
+from fig2mesh.parse.person import check_person
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import CleanFigure, clean
 from fig2mesh.records import Figure
@@ -136,15 +137,16 @@ def convert(
 
     Raises
     ------
-    FigureError, InputError : a file or a value cannot be used; see `fig2mesh.parse.read.read_figure` and
-        `fig2mesh.conversion.place.open_map`
+    FigureError, InputError : a file or a value cannot be used, or hardly a person is found; see
+        `fig2mesh.parse.read.read_figure` and `fig2mesh.conversion.place.open_map`
     """
     observer = observer or Observer()
     check_stages(request)
     start = time.perf_counter()
     sheet = sheet or open_map(request)
     placing_s = time.perf_counter() - start
-    drawn = figure or read_figure(**request.reading(), name=request.name)
+    drawn = figure or read_figure(**request.reading(), name=request.name, force=request.force)
+    check_person(request.figure, drawn.score, request.force)
     settings = settings_of(request)
     if store is None and request.save_stages is not None:
         store = folder_store(request.save_stages, drawn, settings, request.resume_from)
@@ -157,7 +159,7 @@ def convert(
         observer.note("place", why, placing_s + time.perf_counter() - start)
     runner = Runner(settings, store=store or NoStore(), observer=observer)
     run = _run(runner, cleaned, (lift, solid, simplify, model), placed.height_m)
-    asset = asset_of(request, run.figure.name, run.results[model], settings, placed)
+    asset = asset_of(request, run.figure, run.results[model], settings, placed)
     return Conversion(request, settings, run, placed, asset)
 
 

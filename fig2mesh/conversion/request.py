@@ -217,6 +217,7 @@ class OutputOptions:
     evidence: bool = option(
         default=True, help="Store part names, and the share of each part that the drawing shows, as glTF feature ids."
     )
+    force: bool = option(default=False, help="Convert pictures in which hardly a person is found, too.")
     save_stages: Path | None = option(
         default=None, metavar="DIR", column=False, help="Save the result of each stage in DIR."
     )

@@ -45,8 +45,8 @@ FITS: Final = 0.9
 """Share of changed joints inside the silhouette from which the change explains what is wrong."""
 
 
-class Finding(NamedTuple):
-    """Finding about files that do not fit together.
+class Mismatch(NamedTuple):
+    """Mismatch of files that do not fit together.
 
     text : as in messages; remedy : the way to mend it, with a guess at what is wrong
     certain : whether the files cannot be used
@@ -68,8 +68,8 @@ class Change(NamedTuple):
         return np.asarray(points @ self.matrix.T + self.offset, np.float64)
 
 
-class Frame(NamedTuple):
-    """Frame of a figure's window. size : (width, height) of the whole picture; corner : (x, y) of the window there;
+class PictureFrame(NamedTuple):
+    """PictureFrame of a figure's window. size : (width, height) of the whole picture; corner : (x, y) of the window there;
     window : its (width, height)"""
 
     size: tuple[int, int]
@@ -77,8 +77,8 @@ class Frame(NamedTuple):
     window: tuple[int, int]
 
 
-class Fit(NamedTuple):
-    """Fit of joints and silhouette. inside : share of the joints in it; extent : of the joints, share of its own"""
+class JointFit(NamedTuple):
+    """JointFit of joints and silhouette. inside : share of the joints in it; extent : of the joints, share of its own"""
 
     inside: float
     extent: float
@@ -101,15 +101,15 @@ class Reduced(NamedTuple):
     def extent(self) -> float:
         return float(np.linalg.norm(self.high - self.low))
 
-    def fit(self, points: NDArray[np.floating]) -> Fit:
-        """Fit of (N, 2) joints, px of the window."""
+    def fit(self, points: NDArray[np.floating]) -> JointFit:
+        """JointFit of (N, 2) joints, px of the window."""
         cells = np.asarray(points, np.float64) / self.step
         limit = np.array(self.away.shape[::-1], np.float64) - 1
         near = np.clip(cells, 0, limit)
         beyond = np.linalg.norm(cells - np.clip(cells, -1, limit + 2), axis=1) * self.step
         away = self.away[near[:, 1].astype(int), near[:, 0].astype(int)] + beyond
         extent = float(np.linalg.norm(np.ptp(points, axis=0))) / max(self.extent, 1e-9)
-        return Fit(float((away <= SLACK * self.extent).mean()), extent)
+        return JointFit(float((away <= SLACK * self.extent).mean()), extent)
 
 
 def reduced(mask: BoolArray) -> Reduced:
@@ -124,8 +124,8 @@ def reduced(mask: BoolArray) -> Reduced:
     return Reduced(away, step, low, high)
 
 
-def coordinate_finding(points: NDArray[np.floating], frame: Frame) -> Finding | None:
-    """Finding about joints that no picture is needed for: normalised ones, or all at one place.
+def coordinate_finding(points: NDArray[np.floating], frame: PictureFrame) -> Mismatch | None:
+    """Mismatch of joints that no picture is needed for: normalised ones, or all at one place.
 
     points : (N, 2), px of the whole picture
     """
@@ -133,16 +133,16 @@ def coordinate_finding(points: NDArray[np.floating], frame: Frame) -> Finding | 
     spread = float((high - low).max())
     if float(low.min()) >= -1 and float(high.max()) <= 2 and min(frame.size) > 8:
         found = f"all joints lie between {low.min():.3g} and {high.max():.3g}"
-        return Finding(found, "coordinates from 0 to 1? give pixels", True)
+        return Mismatch(found, "coordinates from 0 to 1? give pixels", True)
     if spread < max(2.0, 0.005 * max(frame.window)):
         found = f"all joints lie within {spread:.3g} px of one point"
-        return Finding(found, "give each joint its own position, in pixels of the picture", True)
+        return Mismatch(found, "give each joint its own position, in pixels of the picture", True)
     if (low[0] >= 0) and high[1] <= 0 and spread > 2:
-        return Finding("all joints have a negative y", "y upwards? count it downwards from the picture's top", True)
+        return Mismatch("all joints have a negative y", "y upwards? count it downwards from the picture's top", True)
     return None
 
 
-def changes(frame: Frame) -> Iterator[Change]:
+def changes(frame: PictureFrame) -> Iterator[Change]:
     """Changes by which the coordinates of other programs differ from pixels of the picture."""
     size, corner = np.array(frame.size, float), np.array(frame.corner, float)
     one, none = np.eye(2), np.zeros(2)
@@ -166,16 +166,16 @@ def changes(frame: Frame) -> Iterator[Change]:
 
 
 def joint_finding(
-    points: NDArray[np.floating], silhouette: Reduced, frame: Frame, inferred: bool = False
-) -> Finding | None:
-    """Finding about joints and a silhouette that do not fit together; None where they do.
+    points: NDArray[np.floating], silhouette: Reduced, frame: PictureFrame, inferred: bool = False
+) -> Mismatch | None:
+    """Mismatch of joints and a silhouette that do not fit together; None where they do.
 
     points : (N, 2) of the joints that the file has, px of the window
     inferred : the silhouette is inferred, which may be wrong itself
     """
     found = silhouette.fit(points)
     if len(points) < MIN_WHOLE:  # a few joints may be of the upper half alone
-        found = Fit(found.inside, 1.0)
+        found = JointFit(found.inside, 1.0)
     corner = np.array(frame.corner, np.float64)
     if found.inside >= SURE_INSIDE and SURE_EXTENT <= found.extent <= MAX_EXTENT:
         return None
@@ -197,7 +197,7 @@ def joint_finding(
     wrong = found.inside < least or (not inferred and not MIN_EXTENT <= found.extent <= MAX_EXTENT)
     # What a change explains needs less to be wrong.
     meant = found.inside < (least + EXPLAINED_INSIDE - MIN_INSIDE) or found.extent < EXPLAINED_EXTENT
-    return Finding(text, remedy, (wrong and not inferred) or (understood and (wrong or meant)))
+    return Mismatch(text, remedy, (wrong and not inferred) or (understood and (wrong or meant)))
 
 
 def _explained(
@@ -216,8 +216,8 @@ def _moved(points: NDArray[np.floating], silhouette: Reduced) -> NDArray[np.floa
     return shift if silhouette.fit(points + shift).good else None
 
 
-def upright_finding(points: FloatArray, silhouette: Reduced) -> Finding | None:
-    """Finding about joints upside down: the head below the feet; points : (21, 2), px of the window"""
+def upright_finding(points: FloatArray, silhouette: Reduced) -> Mismatch | None:
+    """Mismatch of joints upside down: the head below the feet; points : (21, 2), px of the window"""
     y = points[:, 1]
     feet = [y[JOINT[f"{side}_{name}"]] for side in SIDES for name in ("ankle", "foot")]
     if y[JOINT["head"]] < max(feet) or y[JOINT["head"]] < y[JOINT["pelvis"]]:
@@ -226,11 +226,11 @@ def upright_finding(points: FloatArray, silhouette: Reduced) -> Finding | None:
     turned = silhouette.fit(points * [1, -1] + [0, middle]).inside
     certain = turned >= FITS and turned > silhouette.fit(points).inside + 0.02
     remedy = "y upwards? count it downwards from the picture's top, unless the figure stands on its head"
-    return Finding("the head is below the feet", remedy, certain)
+    return Mismatch("the head is below the feet", remedy, certain)
 
 
-def side_finding(points: FloatArray, visible: BoolArray) -> Finding | None:
-    """Finding about joints whose left and right look exchanged: eyes are visible, but left is where right should be.
+def side_finding(points: FloatArray, visible: BoolArray) -> Mismatch | None:
+    """Mismatch of joints whose left and right look exchanged: eyes are visible, but left is where right should be.
 
     points : (21, 2) IMAGE
     """
@@ -240,4 +240,4 @@ def side_finding(points: FloatArray, visible: BoolArray) -> Finding | None:
         return None
     text = "left shoulder and hip are where a figure that faces the viewer has the right ones, yet its eyes are visible"
     remedy = "mirrored? exchange l_ and r_, or mark the eyes as hidden if it shows its back"
-    return Finding(text, remedy, False)
+    return Mismatch(text, remedy, False)

@@ -43,6 +43,11 @@ class Inference:
     confidence: FloatArray
     doubts: tuple[str, ...]
 
+    @property
+    def score(self) -> float:
+        """Mean confidence of the joints, 0-1, see `fig2mesh.parse.person`."""
+        return round(float(self.confidence.mean()), 3)
+
 
 class Prediction(NamedTuple):
     """Prediction of the network for a square of the picture.

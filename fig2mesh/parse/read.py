@@ -12,8 +12,8 @@ import numpy as np
 
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.consistency import (
-    Finding,
-    Frame,
+    Mismatch,
+    PictureFrame,
     coordinate_finding,
     joint_finding,
     reduced,
@@ -21,6 +21,7 @@ from fig2mesh.parse.consistency import (
     upright_finding,
 )
 from fig2mesh.parse.keypoints import Joints, read_keypoints
+from fig2mesh.parse.person import check_person, person_doubts
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
 from fig2mesh.parse.silhouette_checks import edge_finding, label_finding, silhouette_finding
 from fig2mesh.parse.standing import moved
@@ -77,6 +78,7 @@ def read_figure(
     part_labels: Path | str | None = None,
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
+    force: bool = True,
 ) -> Figure:
     """Read a figure from its files; a missing silhouette and missing joints are inferred from the picture.
 
@@ -88,11 +90,12 @@ def read_figure(
     part_labels : 8-bit single-channel picture of a size as for `mask` with the labels of `PART_NAMES`
     bbox : x0, y0, x1, y1 in IMAGE pixels, x1 and y1 exclusive; everything outside is cut off
     name : identifier of the figure; default: the file's stem
+    force : whether a picture is read in which hardly a person is found; its score and doubts say so
 
     Raises
     ------
-    FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, no figure is
-        found in the picture
+    FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, files do not
+        belong together, no figure is found in the picture
     """
     given = read_parsed(
         Path(path),
@@ -101,6 +104,7 @@ def read_figure(
         part_labels=None if part_labels is None else Path(part_labels),
         bbox=bbox,
         name=name,
+        force=force,
     )
     return given.figure
 
@@ -114,6 +118,7 @@ def read_parsed(
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
     labels: bool = False,
+    force: bool = True,
 ) -> Reading:
     """As `read_figure`, and return what was inferred as well; labels : infer part labels where none are given."""
     given = read_given(path, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
@@ -127,9 +132,11 @@ def read_parsed(
                 doubts += _settled(keypoints, _joint_findings(joints, silhouette, view, inferred=True))
         if joints is None:
             joints, confidence = Joints(found.joints_px, found.visible), found.confidence
-            if found.doubts:
-                log.warning("%s: %s; %s", path, "; ".join(found.doubts), REMEDY)
-            doubts += found.doubts
+            check_person(path, found.score, force)
+            unlikely = (*person_doubts(found.score), *found.doubts)
+            if unlikely:
+                log.warning("%s: %s; %s", path, "; ".join(unlikely), REMEDY)
+            doubts += unlikely
         elif joints.missing:
             joints = _completed(joints, found)
             missing = f"{listed(joints.missing)} inferred: the joints file does not have them"
@@ -146,7 +153,7 @@ def read_parsed(
         depth_order=joints.depth_order,
         origin_px=(float(view.corner[0]), float(view.corner[1])),
         doubts=tuple(doubts),
-        score=None if confidence is None else round(float(confidence.mean()), 3),
+        score=None if confidence is None else found.score,
     )
     return Reading(figure, view, parts, confidence)
 
@@ -232,14 +239,14 @@ def _check_coordinates(path: Path, joints: Joints, view: PictureView) -> None:
     _settled(path, [coordinate_finding(points, _frame(view))])
 
 
-def _frame(view: PictureView) -> Frame:
+def _frame(view: PictureView) -> PictureFrame:
     height, width = view.rgba.shape[:2]
-    return Frame(view.size, view.corner, (width, height))
+    return PictureFrame(view.size, view.corner, (width, height))
 
 
 def _joint_findings(
     joints: Joints, silhouette: BoolArray, view: PictureView, inferred: bool = False
-) -> Iterator[Finding | None]:
+) -> Iterator[Mismatch | None]:
     outline = reduced(silhouette)
     yield joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
     if not joints.missing:
@@ -247,13 +254,13 @@ def _joint_findings(
         yield side_finding(joints.points_px, joints.visible)
 
 
-def _silhouette_findings(silhouette: BoolArray, view: PictureView, given: bool) -> Iterator[Finding | None]:
+def _silhouette_findings(silhouette: BoolArray, view: PictureView, given: bool) -> Iterator[Mismatch | None]:
     yield silhouette_finding(silhouette, _frame(view))
     if given:  # an alpha channel is a part of its picture
         yield edge_finding(view.rgba, silhouette)
 
 
-def _settled(path: Path, findings: Iterable[Finding | None]) -> list[str]:
+def _settled(path: Path, findings: Iterable[Mismatch | None]) -> list[str]:
     """Doubts of findings, logged. Raises FigureError for the first that is certain."""
     found = [each for each in findings if each is not None]
     for each in found:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
-from fig2mesh.parse.consistency import EXPLAINED_INSIDE, MIN_INSIDE, WORKING_PX, Finding, Frame
+from fig2mesh.parse.consistency import EXPLAINED_INSIDE, MIN_INSIDE, WORKING_PX, Mismatch, PictureFrame
 from fig2mesh.parse.picture import on_white
 from fig2mesh.records import BoolArray, ByteArray, FloatArray
 from fig2mesh.skeleton import BODY_PARTS, JOINT, LIMB_BONES, PART, PART_MIRROR, SIDES
@@ -32,24 +32,24 @@ MIN_ON_EDGES: Final = 0.5
 of the given one, and what that has below which it is refused. Those of the figures measured have 1.00."""
 
 
-def silhouette_finding(mask: BoolArray, frame: Frame, inferred: bool = False) -> Finding | None:
-    """Finding about a silhouette that is inverted, or covers all or hardly any of the picture; mask : (H, W)"""
+def silhouette_finding(mask: BoolArray, frame: PictureFrame, inferred: bool = False) -> Mismatch | None:
+    """Mismatch of a silhouette that is inverted, or covers all or hardly any of the picture; mask : (H, W)"""
     cover = float(mask.mean())
     rim = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]])
     corners = mask[[0, 0, -1, -1], [0, -1, 0, -1]].all()
     remedy = "give a silhouette of the figure, bright on dark, or leave it out to have it inferred"
     if cover >= MAX_COVER:
-        return Finding(f"the silhouette covers {cover:.1%} of the picture", remedy, not inferred)
+        return Mismatch(f"the silhouette covers {cover:.1%} of the picture", remedy, not inferred)
     if corners and float(rim.mean()) > MAX_RIM:
         text = f"the silhouette covers all corners and {rim.mean():.0%} of the picture's rim"
-        return Finding(text, f"inverted? {remedy}", not inferred)
+        return Mismatch(text, f"inverted? {remedy}", not inferred)
     if mask.sum() < 100 or (cover < 2e-4 and frame.window == frame.size):
-        return Finding(f"the silhouette has {int(mask.sum())} px of {mask.size}", remedy, False)
+        return Mismatch(f"the silhouette has {int(mask.sum())} px of {mask.size}", remedy, False)
     return None
 
 
-def edge_finding(rgba: ByteArray, mask: BoolArray) -> Finding | None:
-    """Finding about a silhouette whose outline is beside the picture's edges, while a changed one's is on them.
+def edge_finding(rgba: ByteArray, mask: BoolArray) -> Mismatch | None:
+    """Mismatch of a silhouette whose outline is beside the picture's edges, while a changed one's is on them.
 
     rgba : (H, W, 4); mask : (H, W)
     """
@@ -77,7 +77,7 @@ def edge_finding(rgba: ByteArray, mask: BoolArray) -> Finding | None:
     if best < ON_EDGES or best < found + MIN_GAIN:
         return None
     text = f"{found:.0%} of the silhouette's outline follows edges of the picture"
-    return Finding(text, f"{remedy}, or pass the silhouette of this picture", found < MIN_ON_EDGES)
+    return Mismatch(text, f"{remedy}, or pass the silhouette of this picture", found < MIN_ON_EDGES)
 
 
 def _best_shift(edges: BoolArray, outline: BoolArray) -> tuple[float, tuple[int, int]]:
@@ -92,8 +92,8 @@ def _best_shift(edges: BoolArray, outline: BoolArray) -> tuple[float, tuple[int,
     return float(found.max() / outline.sum()), (dx, dy)
 
 
-def label_finding(labels: ByteArray, mask: BoolArray, points: FloatArray | None) -> Finding | None:
-    """Finding about part labels that are of another figure.
+def label_finding(labels: ByteArray, mask: BoolArray, points: FloatArray | None) -> Mismatch | None:
+    """Mismatch of part labels that are of another figure.
 
     labels : (H, W), 0 where none is given; points : (21, 2) joints, px of the window, None where they are not given
     """
@@ -105,15 +105,15 @@ def label_finding(labels: ByteArray, mask: BoolArray, points: FloatArray | None)
     if inside < EXPLAINED_INSIDE:
         mirrored = float((labelled[:, ::-1] & mask).sum()) / float(labelled.sum())
         guess = "of the mirrored picture? mirror them, or " if mirrored > max(0.9, inside + 0.15) else ""
-        return Finding(f"{inside:.0%} of the part labels lie in the silhouette", guess + remedy, inside < MIN_INSIDE)
+        return Mismatch(f"{inside:.0%} of the part labels lie in the silhouette", guess + remedy, inside < MIN_INSIDE)
     if points is None:
         return None
     same, other, count = _along_bones(labels, points)
     if other >= 3 and other > 2 * same:
         text = f"{other} of {count} part labels along the bones are those of the other side"
-        return Finding(text, "mirrored? exchange left and right of the labels or of the joints", False)
+        return Mismatch(text, "mirrored? exchange left and right of the labels or of the joints", False)
     if count >= 6 and same < 0.3 * count:
-        return Finding(f"{same} of {count} part labels along the bones are those of the joints", remedy, False)
+        return Mismatch(f"{same} of {count} part labels along the bones are those of the joints", remedy, False)
     return None
 
 
