@@ -69,7 +69,7 @@ class Change(NamedTuple):
 
 
 class PictureFrame(NamedTuple):
-    """PictureFrame of a figure's window. size : (width, height) of the whole picture; corner : (x, y) of the window there;
+    """Window of a figure. size : (width, height) of the whole picture; corner : (x, y) of the window there;
     window : its (width, height)"""
 
     size: tuple[int, int]
@@ -78,7 +78,7 @@ class PictureFrame(NamedTuple):
 
 
 class JointFit(NamedTuple):
-    """JointFit of joints and silhouette. inside : share of the joints in it; extent : of the joints, share of its own"""
+    """How joints fit a silhouette. inside : share of the joints in it; extent : of the joints, share of its own"""
 
     inside: float
     extent: float

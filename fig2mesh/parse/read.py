@@ -21,6 +21,7 @@ from fig2mesh.parse.consistency import (
     upright_finding,
 )
 from fig2mesh.parse.keypoints import Joints, read_keypoints
+from fig2mesh.parse.missed import detached_pieces, missed_things
 from fig2mesh.parse.person import check_person, person_doubts
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
 from fig2mesh.parse.silhouette_checks import edge_finding, label_finding, silhouette_finding
@@ -128,6 +129,8 @@ def read_parsed(
         found = _inferred(path, view.rgba, silhouette)
         if silhouette is None:
             silhouette = found.mask
+            beside = missed_things(on_white(view.rgba), silhouette, view.corner)
+            doubts += _logged(path, (*beside, *detached_pieces(silhouette, view.corner)))
             if joints is not None and keypoints is not None:
                 doubts += _settled(keypoints, _joint_findings(joints, silhouette, view, inferred=True))
         if joints is None:
