@@ -127,12 +127,6 @@ def read_parsed(
     confidence, parts, doubts = None, known, list(given.doubts)
     if silhouette is None or joints is None or joints.missing or (labels and part_labels is None):
         found = _inferred(path, view.rgba, silhouette)
-        if silhouette is None:
-            silhouette = found.mask
-            beside = missed_things(on_white(view.rgba), silhouette, view.corner)
-            doubts += _logged(path, (*beside, *detached_pieces(silhouette, view.corner)))
-            if joints is not None and keypoints is not None:
-                doubts += _settled(keypoints, _joint_findings(joints, silhouette, view, inferred=True))
         if joints is None:
             joints, confidence = Joints(found.joints_px, found.visible), found.confidence
             check_person(path, found.score, force)
@@ -144,6 +138,12 @@ def read_parsed(
             joints = _completed(joints, found)
             missing = f"{listed(joints.missing)} inferred: the joints file does not have them"
             doubts += _logged(path, (missing,))
+        if silhouette is None:
+            silhouette = found.mask
+            beside = missed_things(on_white(view.rgba), silhouette, view.corner)
+            doubts += _logged(path, (*beside, *detached_pieces(silhouette, view.corner)))
+            if keypoints is not None:
+                doubts += _settled(keypoints, _joint_findings(joints, silhouette, view, inferred=True))
         if part_labels is None:
             parts = found.part_labels
     figure = Figure(
