@@ -1,7 +1,7 @@
 """Whether what was found in a picture is a person.
 
 The score is the mean confidence of the inferred joints. Measured on 2026-12-01 with the shipped network: 26 pictures of
-single figures have 0.58 to 0.87, 44 whole people cut out of crowded pages 0.29 to 0.87, 153 pictures without a person
+single figures have 0.58 to 0.87, 44 whole people cut out of crowded pages 0.29 to 0.74, 153 pictures without a person
 (maps, landscapes, animals, lettering, bindings, drawn cats, trees, houses, text, blank paper) up to 0.53. At this limit
 none of the 26 is refused, 12 of the 44 (small ones, of whose joints at least a third is unsure) and 141 of the 153.
 """
