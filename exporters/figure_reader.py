@@ -17,7 +17,7 @@ from exporters.georeference import placement_of_record
 from exporters.gltf.reader import Gltf, open_glb
 from exporters.gltf.stated import stated_corners
 from exporters.level_error import monotone_errors
-from exporters.placed_figure import PlacedFigure, area_mean, ecef_matrix, vector
+from exporters.placed_figure import PlacedFigure, area_mean, doubts_of, ecef_matrix, vector
 from exporters.tiles.b3dm import part_table
 from georef.geodesy import tile_from_asset
 from georef.untrusted.damage import DamagedFile
@@ -68,6 +68,7 @@ def read_figure(path: Path) -> PlacedFigure:
         if not all(isinstance(share, float) for share in shares):
             raise DamagedFile("observedShare does not consist of numbers")
         metadata = gltf.extras.get("metadata")
+        score, doubts = doubts_of(metadata)
         return PlacedFigure(
             name=next((str(node["name"]) for node in gltf.items("nodes") if node.get("name")), path.stem),
             placement=placement,
@@ -80,6 +81,8 @@ def read_figure(path: Path) -> PlacedFigure:
             parts=tuple(map(str, table.get("name", []))),
             shares=tuple(round(share, 4) for share in shares),
             observed=_observed(gltf, np.array(shares)) if shares else None,
+            score=score,
+            doubts=doubts,
         )
     except DamagedFile as error:
         raise ExportError(path, f"broken glTF ({error})", "run fig2mesh validate") from error
@@ -168,6 +171,8 @@ def _figure_of_tiles(tile: dict[str, Any], path: Path) -> PlacedFigure:
         parts=finest.parts,
         shares=finest.shares,
         observed=finest.observed,
+        score=finest.score,
+        doubts=finest.doubts,
     )
 
 

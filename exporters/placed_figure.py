@@ -44,6 +44,7 @@ class PlacedFigure:
     observed : the same share for the whole surface; None if unknown
     attributes : further columns of the figure's row in a table, such as artist and year: pairs of name and value,
         stored as `plain_attributes`. Figures of one table have the same columns in the same order
+    score : confidence that it is a person, 0-1; None where its joints were given; doubts : about it, as one text
     """
 
     name: str
@@ -58,6 +59,8 @@ class PlacedFigure:
     shares: tuple[float, ...] = ()
     observed: float | None = None
     attributes: Attributes = ()
+    score: float | None = None
+    doubts: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "attributes", plain_attributes(self.attributes))
@@ -106,6 +109,7 @@ def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
     outlines = [mesh.outline.vertices for mesh in asset.lods if mesh.outline is not None]
     vertices = tile_from_asset().apply(np.concatenate([*(mesh.vertices for mesh in asset.lods), *outlines]))
     mesh = asset.mesh
+    score, doubts = doubts_of(asset.metadata)
     shares = observed_shares(mesh) or {}
     labels = [] if mesh.parts is None else np.unique(mesh.parts).tolist()
     corners = mesh.vertices[mesh.faces].astype(np.float64)
@@ -121,7 +125,19 @@ def figure_of(asset: Asset, contents: tuple[str, ...]) -> PlacedFigure:
         parts=tuple(asset.part_names.get(label, f"part_{label}") for label in labels),
         shares=tuple(round(shares[label], 4) for label in labels) if shares else (),
         observed=_mean_share(shares, face_parts(mesh), corners) if shares else None,
+        score=score,
+        doubts=doubts,
     )
+
+
+def doubts_of(metadata: Any) -> tuple[float | None, str]:
+    """Score and doubts in the metadata of an asset or of a file; (None, "") where there are none."""
+    if not isinstance(metadata, Mapping):
+        return None, ""
+    score, doubts = metadata.get("score"), metadata.get("doubts")
+    usable = isinstance(score, int | float) and not isinstance(score, bool) and math.isfinite(score)
+    lines = [str(each) for each in doubts] if isinstance(doubts, list) else []
+    return (float(score) if usable and score is not None else None), "; ".join(lines)
 
 
 def _mean_share(shares: dict[int, float], faces: NDArray[Any], corners: NDArray[np.float64]) -> float:

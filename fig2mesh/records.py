@@ -45,6 +45,8 @@ class Figure(_Checked):
         pose
     origin_px : (x, y) of its upper left corner in the picture that it was cut from, px of that picture
     step_px : pixels of that picture per pixel of its own
+    doubts : what is unlikely about its files and about what was inferred, as text
+    score : mean confidence of its joints, 0-1, where they were inferred, else None
     """
 
     name: str
@@ -56,6 +58,8 @@ class Figure(_Checked):
     depth_order: Mapping[str, DepthOrder] = field(default_factory=dict)
     origin_px: tuple[float, float] = (0.0, 0.0)
     step_px: float = 1.0
+    doubts: tuple[str, ...] = ()
+    score: float | None = None
 
     def __post_init__(self) -> None:
         self._put("rgba", np.uint8, (None, None, 4))

@@ -29,6 +29,8 @@ OWN_PROPERTIES: dict[str, type] = {
     "height_datum": str,
     "altitude_mode": str,
     "observed_share": float,
+    "score": float,
+    "doubts": str,
     "parts": str,
     "model": str,
 }
@@ -56,6 +58,8 @@ def feature(figure: PlacedFigure, model: str | None) -> dict[str, Any]:
         "height_datum": place.height_datum,
         "altitude_mode": place.altitude_mode,
         "observed_share": figure.observed,
+        "score": figure.score,
+        "doubts": figure.doubts or None,
         "parts": ", ".join(figure.parts) or None,  # text, as GIS tables have no lists
         "model": quote(model) if model else None,
     }

@@ -65,10 +65,11 @@ def preview_page(subject: AnnotatedPicture, annotation: Annotation, parts: Parts
 
 
 def main_command(figure: Path, folder: Path, bbox: tuple[int, int, int, int] | None) -> str:
-    """Command line that converts the saved annotation to a model."""
+    """Command line that converts the saved annotation to a placed model, again and again; LON and LAT are to be filled
+    in."""
     words = ["fig2mesh", str(figure)]
     for option, name in (("--keypoints", KEYPOINTS), ("--mask", MASK), ("--part-labels", PART_LABELS)):
         words += [option, str(folder / name)]
     if bbox is not None:
         words += ["--bbox", *map(str, bbox)]
-    return shlex.join(words)
+    return f"{shlex.join(words)} --lonlat LON LAT --overwrite"

@@ -40,9 +40,30 @@ async function start() {
     find('joint').value = shown.selected;
     find('visible').checked = drawing.joints[shown.selected][2] > 0;
     for (const limb of drawing.head.limbs) find(limb).value = drawing.order[limb] ?? '';
+    if (shown.tool === 'parts') present();
     find('undo').disabled = !drawing.past.length;
     find('redo').disabled = !drawing.future.length;
     shown.draw();
+  }
+
+  /** List the labels that the drawing has, with their colours and shares. */
+  function present() {
+    const counts = new Map();
+    let inside = 0;
+    for (const value of drawing.pixels) {
+      if (!(value & INSIDE)) continue;
+      inside += 1;
+      counts.set(value & (INSIDE - 1), 1 + (counts.get(value & (INSIDE - 1)) ?? 0));
+    }
+    const rows = [...counts].sort((one, other) => other[1] - one[1]).map(([label, count]) => {
+      const row = document.createElement('li');
+      const swatch = document.createElement('i');
+      swatch.style.background = label ? `rgb(${drawing.head.colours[label].join(' ')})` : 'none';
+      const name = label ? drawing.head.parts[label].replaceAll('_', ' ') : 'from the outline';
+      row.append(swatch, ` ${name} ${Math.max(Math.round((100 * count) / inside), 1)} %`);
+      return row;
+    });
+    find('present').replaceChildren(...rows);
   }
 
   function changed() {
@@ -103,6 +124,7 @@ async function start() {
   function choose(tool) {
     shown.tool = tool;
     document.querySelector(`input[name=tool][value=${tool}]`).checked = true;
+    find('present').hidden = tool !== 'parts';
     shown.cursor ??= [drawing.width / 2, drawing.height / 2, radius()];
     update();
   }
@@ -173,8 +195,11 @@ async function start() {
   for (const [id, act] of Object.entries({ swap, undo, redo, save, solid })) find(id).addEventListener('click', act);
 
   const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-  canvas.addEventListener('keydown', (event) => {
-    const step = steps[event.key];
+  document.addEventListener('keydown', (event) => {
+    // Wherever the focus is, arrows move the chosen joint; only of the other controls they are the control's own.
+    const own = event.target.matches('select:not(#joint), input[type=range], input[type=radio]');
+    const step = own || event.ctrlKey || event.metaKey || event.altKey ? undefined : steps[event.key];
+    if (event.key === ' ' && event.target !== canvas) return;
     if (step && shown.tool === 'joints') {
       const [x, y] = drawing.joints[shown.selected];
       const far = event.shiftKey ? 10 : 1;
@@ -206,7 +231,8 @@ async function start() {
     0: () => shown.fit(),
   };
   document.addEventListener('keydown', (event) => {
-    if (event.target.matches('select, input[type=range]')) return;
+    if (event.target.matches('select:not(#joint), input[type=range]')) return;
+    if (event.target.matches('#joint') && !event.ctrlKey && !event.metaKey) return; // letters choose from the list
     const key = event.key.toLowerCase();
     if (event.ctrlKey || event.metaKey) {
       const act = { s: save, z: event.shiftKey ? redo : undo, y: redo }[key];

@@ -174,7 +174,7 @@ def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance
         advance("read")
         files = {name: (path.name, digest_of(path)) for name, path in _figure_files(request).items()}
         key = key_of(stage=READ, files=files, bbox=request.bbox)
-        drawn = store.make(READ, key, Figure, lambda: read_figure(**request.reading(), name=READ))
+        drawn = store.make(READ, key, Figure, lambda: read_figure(**request.reading(), name=READ, force=request.force))
         done = convert(
             request, replace(drawn, name=task.title), sheet=row.sheet(), store=store, observer=Observer(advance)
         )
@@ -192,6 +192,8 @@ def _convert(row: ResolvedRow, store: KeyedStore, before: Sequence[str], advance
         "placement": None if asset.placement is None else asdict(asset.placement),
         "map": done.placed.map,
         "notes": [*map(row.batch.roots.shorten, done.placed.notes), *done.notes],
+        "score": done.run.figure.score,
+        "doubts": [*map(row.batch.roots.shorten, done.run.figure.doubts)],
         "date": task.date or UNKNOWN_DATE,
         "work": {"ran": store.made, "reused": store.reused, "counts": {k: n for k, n in counts.items() if n}},
     }

@@ -25,7 +25,7 @@ NO_LICENSE: Final = """The licence of these figures is not stated.
 Their attribution, where there is one, is the property "credit" of each item and figure.
 """
 
-REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "notes")
+REPORTED: Final = ("inputs", "outputs", "measures", "placement", "map", "score", "doubts", "notes")
 """Entries that the manifest copies from the record of a finished row."""
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,17 +12,18 @@ from exporters.sampling import observed_share
 from fig2mesh.conversion.libraries import __version__
 from fig2mesh.conversion.place import Placed
 from fig2mesh.conversion.request import Request
+from fig2mesh.records import Figure
 from fig2mesh.settings import Settings
 from fig2mesh.skeleton import PART_NAMES
 
 
 def asset_of(
-    request: Request, name: str, levels: tuple[TexturedMesh, ...], settings: Settings, placed: Placed
+    request: Request, figure: Figure, levels: tuple[TexturedMesh, ...], settings: Settings, placed: Placed
 ) -> Asset:
-    """The asset of a request; levels : result of the stage `model`."""
+    """The asset of a request; figure : as it was modelled; levels : result of the stage `model`."""
     if request.evidence == "none":
         levels = tuple(replace(level, parts=None, observed=None) for level in levels)
-    facts = {
+    facts: dict[str, Any] = {
         "source": request.figure.name,
         "seed": settings.seed,
         "quality": request.quality,
@@ -30,8 +32,12 @@ def asset_of(
     share = observed_share(levels[0])
     if share is not None:
         facts["observed_share"] = round(share, 3)
+    if figure.score is not None:
+        facts["score"] = figure.score
+    if figure.doubts:
+        facts["doubts"] = list(figure.doubts)
     return Asset(
-        name=name,
+        name=figure.name,
         lods=levels,
         placement=placed.placement,
         part_names=_part_names(levels) if request.evidence != "none" else {},

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from exporters.asset import Asset
 from exporters.write import has_levels
+from fig2mesh.asset_frame import asset_from_figure, on_drawing
 from fig2mesh.conversion.asset import asset_of
 from fig2mesh.conversion.keys import figure_digest
 from fig2mesh.conversion.observer import Observer
@@ -21,6 +22,9 @@ from fig2mesh.conversion.request import Request
 from fig2mesh.conversion.runner import Inputs, Results, Runner
 from fig2mesh.conversion.stores import FolderStore, NoStore, Store
 from fig2mesh.errors import InputError
+from fig2mesh.image_frame import image_frame
+from fig2mesh.measure.lost import lost_in_model, lost_specks
+from fig2mesh.parse.person import check_person
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import CleanFigure, clean
 from fig2mesh.records import Figure
@@ -57,18 +61,22 @@ class FigureRun:
 
 @dataclass(frozen=True)
 class Conversion:
-    """A model, with the request, settings and stage results that it was made from."""
+    """A model, with the request, settings and stage results that it was made from.
+
+    lost : doubts about parts of the drawing that it does not have; they are among those of its figure
+    """
 
     request: Request
     settings: Settings
     run: FigureRun
     placed: Placed
     asset: Asset
+    lost: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes for the user about the model, one line each."""
-        notes = []
+        notes = list(self.lost)
         if self.run.specks:
             notes.append(f"{self.run.specks} specks of the silhouette are too small to model and were left out")
         found = self.run.results[solid].how
@@ -136,19 +144,21 @@ def convert(
 
     Raises
     ------
-    FigureError, InputError : a file or a value cannot be used; see `fig2mesh.parse.read.read_figure` and
-        `fig2mesh.conversion.place.open_map`
+    FigureError, InputError : a file or a value cannot be used, or hardly a person is found; see
+        `fig2mesh.parse.read.read_figure` and `fig2mesh.conversion.place.open_map`
     """
     observer = observer or Observer()
     check_stages(request)
     start = time.perf_counter()
     sheet = sheet or open_map(request)
     placing_s = time.perf_counter() - start
-    drawn = figure or read_figure(**request.reading(), name=request.name)
+    drawn = figure or read_figure(**request.reading(), name=request.name, force=request.force)
+    check_person(request.figure, drawn.score, request.force)
     settings = settings_of(request)
     if store is None and request.save_stages is not None:
         store = folder_store(request.save_stages, drawn, settings, request.resume_from)
     cleaned = clean(drawn, settings.voxel, settings.picture_px)
+    lost = lost_specks(drawn, cleaned.figure) if cleaned.specks else ()
     del drawn, figure  # four bytes per pixel of what may be a whole sheet
     start = time.perf_counter()
     placed = place(request, sheet, cleaned.figure, request.figure)
@@ -157,8 +167,18 @@ def convert(
         observer.note("place", why, placing_s + time.perf_counter() - start)
     runner = Runner(settings, store=store or NoStore(), observer=observer)
     run = _run(runner, cleaned, (lift, solid, simplify, model), placed.height_m)
-    asset = asset_of(request, run.figure.name, run.results[model], settings, placed)
-    return Conversion(request, settings, run, placed, asset)
+    lost = (*lost, *_lost(run, placed))
+    run = replace(run, figure=replace(run.figure, doubts=(*run.figure.doubts, *lost)))
+    asset = asset_of(request, run.figure, run.results[model], settings, placed)
+    return Conversion(request, settings, run, placed, asset, lost)
+
+
+def _lost(run: FigureRun, placed: Placed) -> tuple[str, ...]:
+    """Doubts about parts of the drawing that the model has not."""
+    mesh = run.results[model][0]
+    transform = asset_from_figure(run.results[lift], run.results[simplify][0].vertices, placed.height_m)
+    pixel, origin_px = on_drawing(image_frame(run.figure), transform)
+    return lost_in_model(mesh, run.figure, metres_per_pixel=pixel, origin_px=origin_px)
 
 
 def settings_of(request: Request) -> Settings:

@@ -36,7 +36,12 @@ def make_report(
     asset, request = done.asset, done.request
     return {
         "fig2mesh": __version__,
-        "figure": {"file": request.figure.name, "pieces": done.run.pieces},
+        "figure": {
+            "file": request.figure.name,
+            "pieces": done.run.pieces,
+            "score": done.run.figure.score,
+            "doubts": list(done.run.figure.doubts),
+        },
         "inputs": {str(path): sha256_of(path) for path in request.files},
         "outputs": {str(path): sha256_of(path) for path in outputs},
         "settings": asdict(done.settings),

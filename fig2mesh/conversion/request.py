@@ -224,6 +224,7 @@ class OutputOptions:
         help="How to store what the drawing shows: parts for part names and the share of each part, as glTF feature "
         "ids; pixels for a mask of the texture as well, which some clients are slow to read; none.",
     )
+    force: bool = option(default=False, help="Convert pictures in which hardly a person is found, too.")
     save_stages: Path | None = option(
         default=None, metavar="DIR", column=False, help="Save the result of each stage in DIR."
     )

@@ -47,6 +47,16 @@ class FrontSimilarity:
     ssim: float
 
 
+@dataclass(frozen=True)
+class FrontOverlap:
+    """The drawn silhouette and the model's front, (h, w) bool, at every step-th pixel of the drawing from `corner`."""
+
+    drawn: BoolArray
+    modelled: BoolArray
+    corner: tuple[int, int]
+    step: int
+
+
 def silhouette_iou(
     mesh: TexturedMesh, mask: BoolArray, *, metres_per_pixel: float, origin_px: tuple[float, float]
 ) -> float:
@@ -57,6 +67,23 @@ def silhouette_iou(
     """
     if not mask.any():
         return 0.0
+    found = front_overlap(mesh, mask, metres_per_pixel=metres_per_pixel, origin_px=origin_px)
+    # Coarse rows can miss lines of one pixel's width altogether.
+    return float((found.drawn & found.modelled).sum() / max(int((found.drawn | found.modelled).sum()), 1))
+
+
+def front_overlap(
+    mesh: TexturedMesh,
+    mask: BoolArray,
+    *,
+    metres_per_pixel: float,
+    origin_px: tuple[float, float],
+    max_side_px: int = MAX_SIDE_PX,
+) -> FrontOverlap:
+    """Drawn silhouette, which is not empty, and model; arguments as of `silhouette_iou`.
+
+    max_side_px : of larger figures only every second, third ... pixel is compared
+    """
     (x0, y0), (x1, y1) = box_of(mask)
     left, bottom, right, top = (edge / metres_per_pixel for edge in view_bounds(mesh, 0.0))
     model = np.array([[origin_px[0] + left, origin_px[1] - top], [origin_px[0] + right, origin_px[1] - bottom]])
@@ -65,14 +92,13 @@ def silhouette_iou(
     width, height = x1 - x0, y1 - y0
     u0, v0 = np.clip(np.floor(model[0]), (x0 - width, y0 - height), (x0, y0)).astype(int).tolist()
     u1, v1 = np.clip(np.ceil(model[1]), (x1, y1), (x1 + width, y1 + height)).astype(int).tolist()
-    step = -(-max(width, height) // MAX_SIDE_PX)
+    step = -(-max(width, height) // max_side_px)
     drawn = every_step(mask, (u0, v0, u1, v1), step)
     origin = coarse_point(origin_px, (u0, v0), step)
     size = drawn.shape[1], drawn.shape[0]
     # Of the modes, only "textured" shows the outline.
     visible = front_pixels(mesh, size, step * metres_per_pixel, origin, 1, "textured")[..., 3] > 0
-    # Coarse rows can miss lines of one pixel's width altogether.
-    return float((drawn & visible).sum() / max(int((drawn | visible).sum()), 1))
+    return FrontOverlap(drawn, visible, (u0, v0), step)
 
 
 def front_similarity(

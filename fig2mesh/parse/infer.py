@@ -26,8 +26,6 @@ than `DARK_THRESHOLD`."""
 MAX_LABEL_CELLS: Final = 320
 """Cells per side of the raster of part labels; the network's own raster is a third as fine."""
 
-REMEDY: Final = "inspect the files that `fig2mesh parse` writes, correct keypoints.json or mask.png, and pass them"
-
 
 @dataclass(frozen=True)
 class Inference:
@@ -44,6 +42,11 @@ class Inference:
     visible: BoolArray
     confidence: FloatArray
     doubts: tuple[str, ...]
+
+    @property
+    def score(self) -> float:
+        """Mean confidence of the joints, 0-1, see `fig2mesh.parse.person`."""
+        return round(float(self.confidence.mean()), 3)
 
 
 class Prediction(NamedTuple):

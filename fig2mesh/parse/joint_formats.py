@@ -1,22 +1,33 @@
-"""Joints in the files of annotation tools, distinguished by content: COCO, LabelMe, Supervisely.
+"""Joints in files of other programs: the one figure that is meant, by the picture's name and its bounding box.
 
-https://cocodataset.org/#format-data
-https://github.com/wkentaro/labelme
-https://developer.supervisely.com/getting-started/supervisely-annotation-format
+Each format has one reader in `FORMATS`; this module chooses among the figures that it finds.
 """
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.joint_names import KNOWN, Point, canonical
+from fig2mesh.parse.annotation_tools import TOOL_FORMATS
+from fig2mesh.parse.joint_names import KNOWN, Point, Repeated, canonical, meanings
+from fig2mesh.parse.labelled_points import LabelledPoints, NotThisFormat
+from fig2mesh.parse.pose_estimators import POSE_FORMATS
 
 Box = tuple[float, float, float, float]
+
+FORMATS = (*TOOL_FORMATS, *POSE_FORMATS)
+"""Readers of all formats; the first that knows a file's structure reads it."""
+
+MAX_SHARE = 2.0
+"""Largest coordinate of a normalised file: MediaPipe puts limbs that the picture cuts off outside of 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -25,41 +36,110 @@ class NamedPoints:
 
     points : canonical name → (2,) float64, IMAGE; visible : the same names → whether it is visible
     size : (width, height) of the picture, None where the file does not state it
+    unknown : names that stand for no joint; picture : file name of another picture that the figure is said to be of
     """
 
     points: dict[str, Point]
     visible: dict[str, bool]
     size: tuple[int, int] | None
+    unknown: tuple[str, ...] = ()
+    picture: str | None = None
 
 
-def named_points(content: Any, path: Path, picture: str, bbox: Box | None) -> NamedPoints | None:
+def named_points(
+    content: Any, path: Path, picture: str, bbox: Box | None, size: tuple[int, int] | None = None
+) -> NamedPoints | None:
     """Points of the one figure in a file; None for a file of none of these formats.
 
-    content : the parsed JSON
-    picture : file name of the drawing, by which one of several pictures in a COCO file is chosen
+    content : the parsed JSON, or the root element of an XML file
+    picture : file name of the drawing, by which one of several pictures is chosen
     bbox : x0, y0, x1, y1, IMAGE, by which one of several figures is chosen: the one with most points inside
+    size : (width, height) of the drawing, for formats with normalised coordinates
 
     Raises FigureError for a damaged file, or one in which the figure is ambiguous.
     """
-    if not isinstance(content, dict):
-        return None
-    if isinstance(content.get("annotations"), list):
-        figures = _coco(content, path, picture)
-    elif isinstance(content.get("shapes"), list):
-        figures = _labelme(content, path)
-    elif isinstance(content.get("objects"), list):
-        figures = _supervisely(content, path)
-    else:
-        return None
-    figures = [figure for figure in figures if figure.points]
-    if not figures:
-        raise FigureError(path, "no joints with known names", "name them head, neck, left_shoulder, … as in the README")
-    if len(figures) > 1 and bbox is not None:
-        inside = [sum(_inside(point, bbox) for point in figure.points.values()) for figure in figures]
-        figures = [figure for figure, count in zip(figures, inside, strict=True) if count == max(inside)]
-    if len(figures) > 1:
-        raise FigureError(path, f"{len(figures)} figures", "pass --bbox X0 Y0 X1 Y1 round the one that is meant")
-    return figures[0]
+    for read in FORMATS:
+        try:
+            people = read(content, path)
+        except NotThisFormat:
+            continue
+        people, other = _of_picture(people, path, picture)
+        figures = [_figure(person, path, size, other) for person in people]
+        return _meant(figures, people, path, bbox)
+    return None
+
+
+def file_name(written: str) -> str:
+    """File name of a path or URL as other programs write it: without folders, query and percent-encoding.
+
+    Label Studio's prefix of eight hexadecimal digits is removed.
+    """
+    text = written.strip()
+    if re.match(r"^[a-z][a-z0-9+.-]+://", text, re.IGNORECASE):
+        parts = urlsplit(text)
+        text = unquote(parts.path) or text
+    elif text.startswith("/data/"):  # Label Studio: /data/upload/1/…, /data/local-files/?d=folder/…
+        text = unquote(text.split("?d=")[-1].split("?")[0])
+    elif "%" in text:
+        text = unquote(text)
+    name = PureWindowsPath(text).name
+    return re.sub(r"^[0-9a-f]{8}-(?=.)", "", name)
+
+
+def same_picture(written: str, picture: str) -> bool:
+    """Whether two file names mean one picture: case, Unicode form and suffix do not matter."""
+
+    def plain(name: str) -> str:
+        text = unicodedata.normalize("NFC", name).casefold()
+        return re.sub(r"\.[a-z0-9]{2,5}$", "", text)
+
+    def exact(name: str) -> str:
+        return PureWindowsPath(unquote(name)).name
+
+    # Roboflow: image_png.rf.0f3a….jpg
+    short = re.sub(r"_(png|jpe?g|webp|tiff?)\.rf\.[0-9a-z]+", "", plain(written), flags=re.IGNORECASE)
+    names = {plain(written), plain(file_name(written)), short, plain(exact(written))}
+    return bool(names & {plain(picture), plain(file_name(picture))})
+
+
+def _of_picture(people: Sequence[LabelledPoints], path: Path, picture: str) -> tuple[list[LabelledPoints], str | None]:
+    """Those of a file's figures that are of the picture; and the name of the other picture that they are said to be of.
+
+    Figures of which the file names no picture may be of any.
+    """
+    named = [person for person in people if person.picture]
+    if not picture or not named:
+        return list(people), None
+    exact = [person for person in named if file_name(str(person.picture)) == picture]
+    matching = exact or [person for person in named if same_picture(str(person.picture), picture)]
+    if matching:
+        return matching, None
+    others = list(dict.fromkeys(file_name(str(person.picture)) for person in named))
+    rest = [person for person in people if not person.picture]
+    if rest:
+        return rest, None
+    if len(others) > 1:
+        found = f"about {len(others)} pictures ({_listed(others, 3)}), none of them {picture}"
+        raise FigureError(path, found, "pass the joints of this picture, or write its file name into the file")
+    return list(people), others[0]
+
+
+def _meant(figures: list[NamedPoints], people: Sequence[LabelledPoints], path: Path, bbox: Box | None) -> NamedPoints:
+    found = [figure for figure in figures if figure.points]
+    if not found:
+        names = list(dict.fromkeys(name for person in people for name, *_ in person.points))
+        written = f" ({_listed(names, 4)})" if names else ""
+        finding = f"no joints with known names{written}"
+        raise FigureError(path, finding, "name them head, neck, left_shoulder, … as in docs/command_line.md")
+    if len(found) > 1 and bbox is not None:
+        inside = [sum(_inside(point, bbox) for point in figure.points.values()) for figure in found]
+        if not max(inside):
+            finding = f"none of its {len(found)} figures is inside --bbox"
+            raise FigureError(path, finding, "give a box round the one that is meant, in pixels of the whole picture")
+        found = [figure for figure, count in zip(found, inside, strict=True) if count == max(inside)]
+    if len(found) > 1:
+        raise FigureError(path, f"{len(found)} figures", "pass --bbox X0 Y0 X1 Y1 round the one that is meant")
+    return found[0]
 
 
 def _inside(point: Point, bbox: Box) -> bool:
@@ -67,100 +147,40 @@ def _inside(point: Point, bbox: Box) -> bool:
     return bool(x0 <= point[0] <= x1 and y0 <= point[1] <= y1)
 
 
-def _coco(content: dict[str, Any], path: Path, picture: str) -> list[NamedPoints]:
-    images = {_key(item.get("id")): item for item in _objects(content.get("images"))}
-    names = {
-        _key(item.get("id")): [canonical(str(name)) for name in item["keypoints"]]
-        for item in _objects(content.get("categories"))
-        if isinstance(item.get("keypoints"), list)
-    }
-    wanted = {key for key, item in images.items() if Path(str(item.get("file_name", ""))).name == picture}
-    figures = []
-    for annotation in _objects(content["annotations"]):
-        image_key = _key(annotation.get("image_id"))
-        if not isinstance(annotation.get("keypoints"), list) or (wanted and image_key not in wanted):
-            continue
-        labels = names.get(_key(annotation.get("category_id"))) or next(iter(names.values()), [])
-        values = annotation["keypoints"]
-        if len(values) != 3 * len(labels):
-            found = f"{len(values)} numbers for {len(labels)} keypoint names"
-            raise FigureError(path, found, "give x, y, v for each name in categories[].keypoints")
-        image = images.get(image_key, {})
-        # v: 0 not labelled, 1 labelled but hidden, 2 visible.
-        triples = [(label, values[3 * i : 3 * i + 2], values[3 * i + 2]) for i, label in enumerate(labels)]
-        shown = [(label, point, flag == 2) for label, point, flag in triples if flag]
-        figures.append(_figure(shown, _size(image.get("width"), image.get("height")), path))
-    return figures
-
-
-def _labelme(content: dict[str, Any], path: Path) -> list[NamedPoints]:
-    groups: dict[str, list[tuple[str, Any, bool]]] = {}
-    for shape in _objects(content["shapes"]):
-        if shape.get("shape_type", "point") != "point":
-            continue
-        points = shape.get("points")
-        if not isinstance(points, list) or len(points) != 1:
-            raise FigureError(path, f"point {str(shape.get('label'))[:30]!r} without coordinates", "draw it again")
-        flags = shape.get("flags")
-        hidden = isinstance(flags, dict) and any(flags.get(word) for word in ("hidden", "occluded", "invisible"))
-        group = groups.setdefault(_key(shape.get("group_id")), [])
-        group.append((canonical(str(shape.get("label"))), points[0], not hidden))
-    size = _size(content.get("imageWidth"), content.get("imageHeight"))
-    return [_figure(group, size, path) for group in groups.values()]
-
-
-def _supervisely(content: dict[str, Any], path: Path) -> list[NamedPoints]:
-    size = content.get("size")
-    shape = _size(size.get("width"), size.get("height")) if isinstance(size, dict) else None
-    loose, figures = [], []
-    for item in _objects(content["objects"]):
-        if item.get("geometryType") == "point":
-            exterior = item.get("points", {}).get("exterior") if isinstance(item.get("points"), dict) else None
-            if not isinstance(exterior, list) or len(exterior) != 1:
-                raise FigureError(path, f"point {str(item.get('classTitle'))[:30]!r} is damaged", "export it again")
-            loose.append((canonical(str(item.get("classTitle"))), exterior[0], not _tagged_hidden(item)))
-        elif item.get("geometryType") == "graph" and isinstance(item.get("nodes"), dict):
-            # Nodes are keyed by their label, or by an identifier whose label stands in the node.
-            nodes = [
-                (canonical(str(node.get("label") or key)), node.get("loc"), not node.get("disabled", False))
-                for key, node in item["nodes"].items()
-                if isinstance(node, dict)
-            ]
-            figures.append(_figure(nodes, shape, path))
-    return figures + ([_figure(loose, shape, path)] if loose else [])
-
-
-def _tagged_hidden(item: dict[str, Any]) -> bool:
-    return any(str(tag.get("name")).lower() in ("hidden", "occluded") for tag in _objects(item.get("tags")))
-
-
-def _objects(values: Any) -> list[dict[str, Any]]:
-    return [value for value in values if isinstance(value, dict)] if isinstance(values, list) else []
-
-
-def _key(identifier: Any) -> str:
-    """Identifier as text: usually a number or a string, but whatever a damaged file has must not break the lookup."""
-    return repr(identifier)
-
-
-def _figure(named: list[tuple[str, Any, bool]], size: tuple[int, int] | None, path: Path) -> NamedPoints:
+def _figure(
+    person: LabelledPoints, path: Path, size: tuple[int, int] | None = None, picture: str | None = None
+) -> NamedPoints:
+    try:
+        annotated = [point for point in person.points if point[1] is not None]
+        empty = [name for name, place, _ in person.points if place is None]
+        chosen, unknown = meanings([name for name, *_ in annotated], empty)
+    except Repeated as error:
+        raise FigureError(path, f"{error} twice", "keep one of each, or give each figure a group") from None
     points: dict[str, Point] = {}
     visible: dict[str, bool] = {}
-    for name, value, shown in named:
-        if name not in KNOWN:
-            continue  # annotation files hold other things too
-        if name in points:
-            raise FigureError(path, f"{name} twice", "keep one of each, or give each figure a group")
-        try:
-            point = np.asarray(value, np.float64)
-        except (TypeError, ValueError):
-            point = np.full(2, np.nan)
-        if point.shape != (2,) or not (np.abs(point) < 1e9).all():
-            raise FigureError(path, f"{name} is {str(value)[:60]}", "give x and y as finite numbers")
-        points[name], visible[name] = point, shown
-    return NamedPoints(points, visible, size)
+    for point, index in chosen.items():
+        _, value, shown = annotated[index]
+        points[point], visible[point] = position(value, point, path), shown
+    if person.normalised and points and max(np.abs(value).max() for value in points.values()) <= MAX_SHARE:
+        scale = person.size or size
+        if scale is None:
+            raise FigureError(path, "coordinates from 0 to 1", "give the size of the picture beside them")
+        points = {name: value * np.array(scale, np.float64) for name, value in points.items()}
+    unknown = tuple(name for name in unknown if canonical(name) not in KNOWN and name not in person.ignored)
+    return NamedPoints(points, visible, person.size, unknown, picture)
 
 
-def _size(width: Any, height: Any) -> tuple[int, int] | None:
-    usable = isinstance(width, int) and isinstance(height, int) and width > 0 and height > 0
-    return (width, height) if usable else None
+def position(value: Any, name: str, path: Path) -> Point:
+    """(2,) position of a point. Raises FigureError unless it is two finite numbers."""
+    try:
+        point = np.asarray(value, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        point = np.full(2, np.nan)
+    if point.shape != (2,) or not (np.abs(point) < 1e9).all():
+        raise FigureError(path, f"{name} is {str(value)[:60]}", "give x and y as finite numbers")
+    return point
+
+
+def _listed(names: Sequence[str], limit: int) -> str:
+    shown = ", ".join(name[:30] for name in names[:limit])
+    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"

@@ -11,6 +11,9 @@ from fig2mesh.skeleton import BONES, JOINT_NAMES
 Document = dict[str, Any]
 Writer = Callable[[FloatArray, BoolArray, tuple[int, int], str], Document]
 
+CORNER_PX = 0.001
+"""x that is written for a hidden joint in the very corner of the picture."""
+
 # fmt: off
 LONG_NAMES = tuple(
     {"l_": "left_", "r_": "right_"}.get(name[:2], name[:2]) + name[2:] for name in JOINT_NAMES
@@ -25,7 +28,9 @@ def as_ours(joints: FloatArray, visible: BoolArray, size: tuple[int, int], pictu
     joints : (21, 2), IMAGE; visible : (21,); size : (width, height) of the picture; picture : its file name
     """
     rows = zip(JOINT_NAMES, _rounded(joints), visible.tolist(), strict=True)
-    return {"width": size[0], "height": size[1], "keypoints": {name: [x, y, int(v)] for name, (x, y), v in rows}}
+    # Three zeros mark a joint that has not been annotated.
+    points = {name: [x if x or y or v else CORNER_PX, y, int(v)] for name, (x, y), v in rows}
+    return {"width": size[0], "height": size[1], "keypoints": points}
 
 
 def as_coco(joints: FloatArray, visible: BoolArray, size: tuple[int, int], picture: str) -> Document:

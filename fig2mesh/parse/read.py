@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fig2mesh.errors import FigureError
+from fig2mesh.parse.consistency import (
+    Mismatch,
+    PictureFrame,
+    coordinate_finding,
+    joint_finding,
+    reduced,
+    side_finding,
+    upright_finding,
+)
 from fig2mesh.parse.keypoints import Joints, read_keypoints
+from fig2mesh.parse.missed import detached_pieces, missed_things
+from fig2mesh.parse.person import check_person, person_doubts
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
+from fig2mesh.parse.silhouette_checks import edge_finding, label_finding, silhouette_finding
+from fig2mesh.parse.standing import moved
 from fig2mesh.records import BoolArray, ByteArray, Figure, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES
 
@@ -19,6 +33,8 @@ if TYPE_CHECKING:
     from fig2mesh.parse.infer import Inference
 
 log = logging.getLogger("fig2mesh")
+
+REMEDY = "inspect the files that `fig2mesh parse` writes, correct keypoints.json or mask.png, and pass them"
 
 JOINT_SLACK_PX = 1.0
 """Tolerance: joints may lie on the picture's edge, and rounding by annotation tools puts them up to a pixel outside."""
@@ -45,12 +61,14 @@ class Given:
 
     view : the figure's window of the picture; silhouette : (H, W) bool, None where no file has one; joints : in pixels
     of the view, None without a file; part_labels : (H, W) uint8, 0 where no label is given
+    doubts : what is unlikely about them, as text
     """
 
     view: PictureView
     silhouette: BoolArray | None
     joints: Joints | None
     part_labels: ByteArray
+    doubts: tuple[str, ...] = field(default=())
 
 
 def read_figure(
@@ -61,6 +79,7 @@ def read_figure(
     part_labels: Path | str | None = None,
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
+    force: bool = True,
 ) -> Figure:
     """Read a figure from its files; a missing silhouette and missing joints are inferred from the picture.
 
@@ -72,11 +91,12 @@ def read_figure(
     part_labels : 8-bit single-channel picture of a size as for `mask` with the labels of `PART_NAMES`
     bbox : x0, y0, x1, y1 in IMAGE pixels, x1 and y1 exclusive; everything outside is cut off
     name : identifier of the figure; default: the file's stem
+    force : whether a picture is read in which hardly a person is found; its score and doubts say so
 
     Raises
     ------
-    FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, no figure is
-        found in the picture
+    FigureError : a file cannot be read, sizes differ, the mask is empty, a joint lies outside the picture, files do not
+        belong together, no figure is found in the picture
     """
     given = read_parsed(
         Path(path),
@@ -85,6 +105,7 @@ def read_figure(
         part_labels=None if part_labels is None else Path(part_labels),
         bbox=bbox,
         name=name,
+        force=force,
     )
     return given.figure
 
@@ -98,16 +119,31 @@ def read_parsed(
     bbox: tuple[int, int, int, int] | None = None,
     name: str | None = None,
     labels: bool = False,
+    force: bool = True,
 ) -> Reading:
     """As `read_figure`, and return what was inferred as well; labels : infer part labels where none are given."""
     given = read_given(path, mask=mask, keypoints=keypoints, part_labels=part_labels, bbox=bbox)
     view, silhouette, joints, known = given.view, given.silhouette, given.joints, given.part_labels
-    confidence, parts = None, known
-    if silhouette is None or joints is None or (labels and part_labels is None):
+    confidence, parts, doubts = None, known, list(given.doubts)
+    if silhouette is None or joints is None or joints.missing or (labels and part_labels is None):
         found = _inferred(path, view.rgba, silhouette)
-        silhouette = found.mask if silhouette is None else silhouette
         if joints is None:
             joints, confidence = Joints(found.joints_px, found.visible), found.confidence
+            check_person(path, found.score, force)
+            unlikely = (*person_doubts(found.score), *found.doubts)
+            if unlikely:
+                log.warning("%s: %s; %s", path, "; ".join(unlikely), REMEDY)
+            doubts += unlikely
+        elif joints.missing:
+            joints = _completed(joints, found)
+            missing = f"{listed(joints.missing)} inferred: the joints file does not have them"
+            doubts += _logged(path, (missing,))
+        if silhouette is None:
+            silhouette = found.mask
+            beside = missed_things(on_white(view.rgba), silhouette, view.corner)
+            doubts += _logged(path, (*beside, *detached_pieces(silhouette, view.corner)))
+            if keypoints is not None:
+                doubts += _settled(keypoints, _joint_findings(joints, silhouette, view, inferred=True))
         if part_labels is None:
             parts = found.part_labels
     figure = Figure(
@@ -119,6 +155,8 @@ def read_parsed(
         part_labels=np.where(silhouette, known, 0),
         depth_order=joints.depth_order,
         origin_px=(float(view.corner[0]), float(view.corner[1])),
+        doubts=tuple(doubts),
+        score=None if confidence is None else found.score,
     )
     return Reading(figure, view, parts, confidence)
 
@@ -137,39 +175,125 @@ def read_given(
     joints = None if keypoints is None else joints_of_view(keypoints, view, path, bbox)
     shape = view.rgba.shape[:2]
     known = np.zeros(shape, np.uint8) if part_labels is None else read_labels(part_labels, view)
+    where = mask if mask is not None else path
     if silhouette is not None and not silhouette.any():
-        where = mask if mask is not None else path
         raise FigureError(where, "the silhouette is empty", "the figure must be opaque, or bright in --mask")
+    doubts: list[str] = []
+    if joints is not None and keypoints is not None:
+        doubts += _logged(keypoints, _notes(joints, path))
+        _check_coordinates(keypoints, joints, view)
+    if silhouette is not None:
+        doubts += _settled(where, _silhouette_findings(silhouette, view, mask is not None))
+        if joints is not None and keypoints is not None:
+            doubts += _settled(keypoints, _joint_findings(joints, silhouette, view))
+        if part_labels is not None:
+            points = None if joints is None else joints.points_px
+            doubts += _settled(part_labels, [label_finding(known, silhouette, points)])
     if joints is not None:
         size = np.array(shape[::-1], np.float32)
         outside = ((joints.points_px < -JOINT_SLACK_PX) | (joints.points_px > size + JOINT_SLACK_PX)).any(axis=1)
+        outside &= joints.drawn
         if outside.any():
             index = int(np.argmax(outside))
             x, y = joints.points_px[index]
             finding = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
             raise FigureError(keypoints, finding, "move it inside, or pass the joints that belong to this picture")
-    return Given(view, silhouette, joints, known)
+    return Given(view, silhouette, joints, known, tuple(doubts))
 
 
 def joints_of_view(path: Path, view: PictureView, picture: Path, bbox: tuple[int, int, int, int] | None) -> Joints:
     """Read the joints of a file, in IMAGE pixels of the view. Raises FigureError, also for those of another picture."""
-    given = read_keypoints(path, picture.name, bbox)
+    given = read_keypoints(path, picture.name, bbox, view.size)
     if given.size is not None and given.size != view.size:
         made, has = (f"{width}×{height}" for width, height in (given.size, view.size))
         found = f"made for a picture of {made} px, but {picture.name} has {has}"
-        raise FigureError(path, found, "pass the joints that belong to this picture")
-    points = given.points_px - np.array(view.corner, np.float32)
-    return Joints(points, given.visible, given.size, given.depth_order)
+        raise FigureError(path, found, size_remedy(given.size, view.size, view.rgba.shape[1::-1]))
+    return replace(given, points_px=given.points_px - np.array(view.corner, np.float32))
+
+
+def size_remedy(made: tuple[int, int], has: tuple[int, int], window: tuple[int, ...]) -> str:
+    """Remedy for joints made for a picture of another size, with a guess."""
+    remedy = "pass the joints that belong to this picture"
+    if made == tuple(window):
+        return f"made for the part inside --bbox? add its corner to them, or {remedy}"
+    across, down = (length / other for length, other in zip(has, made, strict=True))
+    if abs(across / down - 1) < 0.01:
+        return f"scale them by {across:.4g}, with width and height, or {remedy}"
+    if made == has[::-1]:
+        return f"made before the picture was turned? turn them too, or {remedy}"
+    return remedy
+
+
+def listed(names: Sequence[str], limit: int = 6) -> str:
+    """Names in a message, the first few."""
+    shown = ", ".join(name[:30] for name in names[:limit])
+    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"
+
+
+def _notes(joints: Joints, picture: Path) -> Iterator[str]:
+    if joints.picture is not None:
+        yield f"is about {joints.picture[:60]}, not {picture.name}"
+    if joints.missing and joints.unknown:
+        yield f"not understood: {listed(joints.unknown)}; write {', '.join(joints.missing[:3])}, …"
+
+
+def _check_coordinates(path: Path, joints: Joints, view: PictureView) -> None:
+    points = joints.points_px[joints.drawn] + np.array(view.corner, np.float32)
+    _settled(path, [coordinate_finding(points, _frame(view))])
+
+
+def _frame(view: PictureView) -> PictureFrame:
+    height, width = view.rgba.shape[:2]
+    return PictureFrame(view.size, view.corner, (width, height))
+
+
+def _joint_findings(
+    joints: Joints, silhouette: BoolArray, view: PictureView, inferred: bool = False
+) -> Iterator[Mismatch | None]:
+    outline = reduced(silhouette)
+    yield joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
+    if not joints.missing:
+        yield upright_finding(joints.points_px, outline)
+        yield side_finding(joints.points_px, joints.visible)
+
+
+def _silhouette_findings(silhouette: BoolArray, view: PictureView, given: bool) -> Iterator[Mismatch | None]:
+    yield silhouette_finding(silhouette, _frame(view))
+    if given:  # an alpha channel is a part of its picture
+        yield edge_finding(view.rgba, silhouette)
+
+
+def _settled(path: Path, findings: Iterable[Mismatch | None]) -> list[str]:
+    """Doubts of findings, logged. Raises FigureError for the first that is certain."""
+    found = [each for each in findings if each is not None]
+    for each in found:
+        if each.certain:
+            raise FigureError(path, each.text, each.remedy)
+    return _logged(path, [f"{each.text}; {each.remedy}" for each in found])
+
+
+def _logged(path: Path, doubts: Iterable[str]) -> list[str]:
+    """Doubts about a file, each logged as a warning of one line."""
+    found = list(doubts)
+    for each in found:
+        log.warning("%s: %s", path, each)
+    return found
+
+
+def _completed(joints: Joints, found: Inference) -> Joints:
+    """Joints whose missing ones are those inferred from the picture, moved as the others differ."""
+    has = joints.annotated
+    fitted = moved(found.joints_px, joints.points_px, has)
+    points = np.where(has[:, None], joints.points_px, fitted).astype(np.float32)
+    return replace(joints, points_px=points, visible=np.where(has, joints.visible, found.visible))
 
 
 def _inferred(path: Path, rgba: ByteArray, silhouette: BoolArray | None) -> Inference:
-    """Infer with the figure parser; its doubts are logged as a warning."""
+    """Infer with the figure parser. Raises FigureError where it finds no figure."""
     # torch takes seconds to load: it is imported only for pictures without mask or joints.
-    from fig2mesh.parse.infer import REMEDY, infer_figure
+    from fig2mesh.parse.infer import infer_figure
 
     found = infer_figure(on_white(rgba), silhouette)
     if found is None:
         raise FigureError(path, "no figure found", "pass --bbox round the figure, or --mask and --keypoints")
-    if found.doubts:
-        log.warning("%s: %s; %s", path, "; ".join(found.doubts), REMEDY)
     return found

@@ -86,7 +86,7 @@ def _merged(background: PlainBackground, enclosed: BoolArray, coloured: BoolArra
     beside = _pieces(enclosed & ~coloured, likely, below=EXCLUDE_BELOW)
     beside &= ~_bridges(beside, enclosed & ~beside)
     # An enclosed region of the background's colour is no shadow, but a limb left blank between its lines.
-    beside &= ~_pieces(beside, (~_lines(background)).astype(np.float32), above=0.5)
+    beside &= ~_pieces(beside, (~drawn_lines(background)).astype(np.float32), above=0.5)
     lost = _pieces(coloured & ~enclosed, likely, above=INCLUDE_ABOVE)
     return (enclosed & ~beside) | lost
 
@@ -160,7 +160,7 @@ def _mode(colours: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _enclosed(background: PlainBackground, likely: FloatArray) -> tuple[BoolArray, float]:
     """Region enclosed by lines or colours, for the gap width that agrees best with the guess; and its agreement."""
-    line = _lines(background)
+    line = drawn_lines(background)
     best, top = likely > 0.5, -1.0
     for gap in GAPS:
         found = _flooded(line, likely, gap)
@@ -172,7 +172,8 @@ def _enclosed(background: PlainBackground, likely: FloatArray) -> tuple[BoolArra
     return best, top
 
 
-def _lines(background: PlainBackground) -> BoolArray:
+def drawn_lines(background: PlainBackground) -> BoolArray:
+    """(H, W) whether a pixel differs from the background."""
     return np.asarray(background.away > max(5 * background.noise, BACKGROUND_TOLERANCE))
 
 

@@ -2,11 +2,11 @@
 //
 // stdin:  {browser, url, actions: [{...}, ...]}; an action is one of
 //         {drag: [[x, y], [x, y], ...]}  from place to place, in pixels of the drawing
-//         {key: name}  {click: selector}  {choose: [selector, value]}  {fill: [selector, value]}
+//         {key: name}  {press: [selector, key]}  {click: selector}  {choose: [selector, value]}  {fill: [selector, value]}
 //         {preview: true}  wait until one more preview is shown, and return a picture of it
 //         {screenshot: true}
-// stdout: {results: [{joints, order, status, inside, png?}, ...], messages: [...]}: after each action; `inside` counts
-//         the pixels of the silhouette
+// stdout: {results: [{joints, selected, order, status, inside, present, png?}, ...], messages: [...]}: after each action; `inside` counts
+//         the pixels of the silhouette, `present` lists the parts
 import fs from 'node:fs';
 import { require } from './packages.mjs';
 
@@ -37,6 +37,10 @@ const acts = {
     await page.locator('#canvas').focus();
     await page.keyboard.press(name);
   },
+  press: async ([selector, name]) => {
+    await page.locator(selector).focus();
+    await page.keyboard.press(name);
+  },
   click: (selector) => page.locator(selector).click(),
   choose: ([selector, value]) => page.locator(selector).selectOption(value),
   fill: ([selector, value]) => page.locator(selector).fill(value),
@@ -52,9 +56,10 @@ const acts = {
 };
 
 const state = () => {
-  const { drawing } = window.fig2mesh;
+  const { drawing, shown } = window.fig2mesh;
   const inside = drawing.pixels.reduce((count, value) => count + (value >> 7), 0);
-  return { joints: drawing.joints, order: drawing.order, inside, status: document.getElementById('status').textContent };
+  const [status, present] = ['status', 'present'].map((id) => document.getElementById(id).textContent);
+  return { joints: drawing.joints, selected: shown.selected, order: drawing.order, inside, status, present };
 };
 
 const results = [];

@@ -110,5 +110,6 @@ def test_own_properties_win_and_all_rows_have_the_same(figures: list[PlacedFigur
 
 
 def test_the_declared_types_are_those_of_the_values() -> None:
-    properties = feature(figure("a", ZURICH), "a.glb")["properties"]
+    doubtful = replace(figure("a", ZURICH), score=0.5, doubts="unsure of l_hand")
+    properties = feature(doubtful, "a.glb")["properties"]
     assert all(isinstance(properties[name], kind) for name, kind in OWN_PROPERTIES.items())

@@ -127,6 +127,8 @@ def test_a_bare_picture_can_be_begun_with(tmp_path: Path) -> None:
 def test_the_command_that_is_shown_names_the_files() -> None:
     assert main_command(Path("a b.png"), Path("out"), (1, 2, 3, 4)).split(" --")[0] == "fig2mesh 'a b.png'"
     assert "--bbox 1 2 3 4" in main_command(Path("a.png"), Path("out"), (1, 2, 3, 4))
+    # It says where the place goes, and can be given again.
+    assert main_command(Path("a.png"), Path("out"), None).endswith(" --lonlat LON LAT --overwrite")
 
 
 @pytest.fixture

@@ -120,6 +120,23 @@ def test_undo_and_swap_and_keys(address: str, files: DrawnFiles) -> None:
     assert results[9]["inside"] == results[7]["inside"]
 
 
+def test_arrows_move_the_joint_that_was_chosen_in_the_list(address: str, files: DrawnFiles) -> None:
+    _, given = begin(files.image, files.mask, files.keypoints, None, None)
+    x, y = given.joints_px[JOINT["r_wrist"]].tolist()
+    results = edit(
+        address,
+        {"choose": ["#joint", "r_wrist"]},
+        {"press": ["#joint", "ArrowLeft"]},
+        {"press": ["#save", "Shift+ArrowDown"]},
+        {"press": ["#visible", "ArrowUp"]},
+        {"choose": ["#part", str(PART["hair"])]},
+    )
+    assert results[1]["selected"] == "r_wrist"
+    assert results[3]["joints"]["r_wrist"][:2] == [x - 1, y + 9]
+    assert results[3]["present"] == ""
+    assert results[4]["present"].strip() == "from the outline 100 %"
+
+
 def test_the_preview_shows_the_solid(address: str) -> None:
     (shown,) = edit(address, {"preview": True})
     picture = pixels(shown["png"])[..., :3].astype(int)
