@@ -14,6 +14,7 @@ from exporters.gis.czml import write_czml
 from exporters.gis.geojson import write_geojson
 from exporters.gltf.glb import write_glb, write_gltf
 from exporters.obj import write_obj
+from exporters.paths import check_utf8
 from exporters.ply import write_ply
 from exporters.profiles import GENERAL, Profile, suffix_of
 from exporters.tiles.tileset import TilesVersion, content_name, write_tileset
@@ -106,6 +107,7 @@ def check_outputs(
     parts: dict[str, Path] = {}
     for path in paths:
         main = _main_file(path)
+        check_utf8(path)
         profile.check(os.fspath(path), suffix_of(main))
         check_file(path, main, overwrite)
         for companion in _companions(path, name, lods, tiles_version, profile):

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from exporters.atomic_file import atomic_path, sweep_temporary
 from exporters.gis.time_span import time_span
+from exporters.paths import check_utf8
 from exporters.tiles.tileset import short_range_warning
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column
@@ -27,6 +28,7 @@ from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apar
 from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, check_formats, read_spool, tasks_of, write_spool
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.surroundings import valid_text
 
 log = logging.getLogger("fig2mesh")
 
@@ -71,7 +73,7 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
         if request.dry_run:
             log.info("%d rows: %d valid, %d invalid", count, count - tally.failed, tally.failed)
         else:
-            title = request.title or request.collection.stem
+            title = valid_text(request.title or request.collection.stem)
             summary = summarise_apart(Collection(folder, spool, tuple(unknown), title, request.visible_from))
             _log_summary(folder, tally, summary)
             if summary.figures and (note := short_range_warning(request.visible_from, summary.tallest_m)):
@@ -107,6 +109,7 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
             (Path(name) / WORK).mkdir()
             yield Path(name)
         return
+    check_utf8(output)
     folder = Path(os.path.abspath(output))
     if folder.exists() and not folder.is_dir():
         raise OutputError(output, "not a directory", "give -o a folder")

@@ -18,6 +18,7 @@ from fig2mesh.batch.task import Problem, RowTask
 from fig2mesh.conversion.fields import as_plain, list_of
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
+from fig2mesh.surroundings import valid_text
 
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
 """Formats that a row may request; .glb is always made."""
@@ -68,6 +69,7 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     title = (
         str(given) if given is not None else PurePosixPath(str(values.get("figure", ""))).stem or f"row {row.number}"
     )
+    title = valid_text(title)
     wanted = safe_name(title)[:MAX_NAME].strip(".") or "figure"
     name, number = wanted, 1
     while (other := names.take(name, row.number)) is not None:

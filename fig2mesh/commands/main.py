@@ -39,6 +39,7 @@ from fig2mesh.conversion.request import (
     OutputOptions,
     PlaceRequest,
 )
+from fig2mesh.surroundings import memory_error, name_error, open_streams, temporary_fault
 
 GROUPS = {
     "Figure": FigureFiles,
@@ -147,6 +148,7 @@ def main(arguments: list[str] | None = None) -> int:
     from georef.errors import InputError
 
     words = sys.argv[1:] if arguments is None else arguments
+    open_streams()
     # Pillow warns about damaged tags, in two lines with its own path; our readers report what matters themselves.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     try:
@@ -163,6 +165,9 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo("fig2mesh: " + " ".join(str(error).split()), err=True)
         return 2
     except OSError as error:
+        if error.filename is None and (fault := temporary_fault()) is not None:
+            click.echo(f"fig2mesh: {fault}", err=True)
+            return 2
         # Paths fail in more ways than can be listed: names too long, loops of links, folders that are files.
         where = str(error.filename or "a file")
         shown = where if len(where) < 200 else f"{where[:80]}…{where[-80:]}"
@@ -176,6 +181,9 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if verbosity(words) > 1:
             raise
+        if (finding := memory_error(error) or name_error(error)) is not None:
+            click.echo(f"fig2mesh: {finding}", err=True)
+            return 2
         click.echo(f"fig2mesh: internal error: {type(error).__name__}: {error} (-vv shows where)", err=True)
         return 1
 

@@ -11,6 +11,7 @@ from fig2mesh.commands.options import messages, request_options
 from fig2mesh.conversion.fields import option, request_class
 from fig2mesh.conversion.request import FigureFiles
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.surroundings import valid_text
 from fig2mesh.terminal import configure_logging, log, progress
 
 JointFormat = Literal["fig2mesh", "coco", "labelme", "supervisely"]
@@ -75,7 +76,8 @@ def parse_figure(request: ParseRequest) -> None:
     if there and not request.overwrite:
         raise OutputError(request.output / there[0], "already exists", "use --overwrite or choose another folder")
     annotation = annotation_of(read_parsed(**request.reading(), labels=True))
-    for path in write_annotation(request.output, annotation, request.figure.name, request.format, request.overwrite):
+    picture = valid_text(request.figure.name)
+    for path in write_annotation(request.output, annotation, picture, request.format, request.overwrite):
         log.info("%s", path)
 
 
@@ -93,7 +95,7 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
 
     with progress(quiet) as advance:
         figures = figures_in(on_white(view.rgba), request.smallest, advance)
-    names = write_sheet(folder, figures, sheet.name, view.size, request.format, request.overwrite)
+    names = write_sheet(folder, figures, valid_text(sheet.name), view.size, request.format, request.overwrite)
     for name, figure in zip(names, figures, strict=True):
         box = " ".join(map(str, figure.bbox))
         doubts = f"; {'; '.join(figure.found.doubts)}" if figure.found.doubts else ""

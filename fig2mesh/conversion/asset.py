@@ -13,6 +13,7 @@ from fig2mesh.conversion.place import Placed
 from fig2mesh.conversion.request import Request
 from fig2mesh.settings import Settings
 from fig2mesh.skeleton import PART_NAMES
+from fig2mesh.surroundings import valid_text
 
 
 def asset_of(
@@ -22,7 +23,7 @@ def asset_of(
     if not request.evidence:
         levels = tuple(replace(level, parts=None, observed=None) for level in levels)
     facts = {
-        "source": request.figure.name,
+        "source": valid_text(request.figure.name),
         "seed": settings.seed,
         "quality": request.quality,
         "version": __version__,

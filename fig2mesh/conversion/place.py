@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from fig2mesh.conversion.request import PlaceRequest
 from fig2mesh.errors import InputError
 from fig2mesh.skeleton import FIGURE_HEIGHT
+from fig2mesh.surroundings import valid_text
 from georef.bearing import parse_facing
 from georef.heights import ellipsoidal_height
 from georef.placement import GeoPlacement
@@ -105,7 +106,8 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
     if request.size_from == "map":
         height = height_on_picture(figure) * location.up_m
         if not drawn_on_it:
-            notes.append(f"--size-from map: a pixel of {path.name} is assumed to be as large as a pixel of the sheet")
+            name = valid_text(path.name)
+            notes.append(f"--size-from map: a pixel of {name} is assumed to be as large as a pixel of the sheet")
     lonlat = location.lon_deg, location.lat_deg
     placement = placement_of(request, lonlat, height=height, viewer_deg=location.down_bearing_deg)
     record = _record(request, sheet, location, pixel)
@@ -162,8 +164,8 @@ def _record(request: PlaceRequest, sheet: MapSheet, location: SheetPlace, pixel:
     quality = sheet.quality
     assert request.map is not None
     return {
-        "sheet": (sheet.picture or sheet.file).name,
-        "georeference": sheet.file.name,
+        "sheet": valid_text((sheet.picture or sheet.file).name),
+        "georeference": valid_text(sheet.file.name),
         "crs": sheet.crs,
         "method": sheet.method,
         "fitted_in": sheet.plane.name,

@@ -23,6 +23,7 @@ from fig2mesh.stages.lift import lift
 from fig2mesh.stages.model import model
 from fig2mesh.stages.simplify import simplify
 from fig2mesh.stages.solid import solid
+from fig2mesh.surroundings import valid_text
 
 
 def make_report(
@@ -36,9 +37,9 @@ def make_report(
     asset, request = done.asset, done.request
     return {
         "fig2mesh": __version__,
-        "figure": {"file": request.figure.name, "pieces": done.run.pieces},
-        "inputs": {str(path): sha256_of(path) for path in request.files},
-        "outputs": {str(path): sha256_of(path) for path in outputs},
+        "figure": {"file": valid_text(request.figure.name), "pieces": done.run.pieces},
+        "inputs": {valid_text(str(path)): sha256_of(path) for path in request.files},
+        "outputs": {valid_text(str(path)): sha256_of(path) for path in outputs},
         "settings": asdict(done.settings),
         "placement": asdict(asset.placement) if asset.placement else None,
         "measures": model_measures(done),

@@ -13,6 +13,7 @@ from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.errors import InputError
 from fig2mesh.settings import Closing, Contours, Mesher, Parts, Quality, Settings, Textures, settings_for
 from fig2mesh.skeleton import FIGURE_HEIGHT
+from fig2mesh.surroundings import valid_text
 
 MAX_SEED = 2**31 - 1
 
@@ -246,12 +247,12 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
     @property
     def targets(self) -> tuple[str, ...]:
         """The outputs, or the default output if none is named."""
-        return self.outputs or (self.figure.stem + ".glb",)
+        return self.outputs or (valid_text(self.figure.stem).replace("\ufffd", "_") + ".glb",)
 
     @property
     def title(self) -> str:
         """Name of the figure."""
-        return self.name or self.figure.stem
+        return valid_text(self.name or self.figure.stem)
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -14,6 +14,7 @@ from fig2mesh.parse.keypoints import Joints, read_keypoints
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
 from fig2mesh.records import BoolArray, ByteArray, Figure, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES
+from fig2mesh.surroundings import valid_text
 
 if TYPE_CHECKING:
     from fig2mesh.parse.infer import Inference
@@ -111,7 +112,7 @@ def read_parsed(
         if part_labels is None:
             parts = found.part_labels
     figure = Figure(
-        name=name or path.stem,
+        name=valid_text(name or path.stem),
         rgba=view.rgba,
         mask=silhouette,
         joints_px=np.clip(joints.points_px, 0, np.array(silhouette.shape[::-1], np.float32)),
