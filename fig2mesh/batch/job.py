@@ -28,7 +28,7 @@ from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apar
 from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, check_formats, read_spool, tasks_of, write_spool
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 
 log = logging.getLogger("fig2mesh")
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 from fig2mesh.batch.engine import StageNotice, lost
 from fig2mesh.batch.row_job import check_row, convert_row
 from fig2mesh.batch.task import Batch, Outcome, RowTask
-from fig2mesh.processes import start
+from fig2mesh.system.processes import start
 
 # fmt: off
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",

@@ -15,7 +15,7 @@ from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.row_files import digest_of, files_unchanged
 from fig2mesh.batch.task import RowTask
 from fig2mesh.batch.tasks import read_spool
-from fig2mesh.processes import run_apart
+from fig2mesh.system.processes import run_apart
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 

@@ -18,7 +18,7 @@ from fig2mesh.batch.task import Problem, RowTask
 from fig2mesh.conversion.fields import as_plain, list_of
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 
 FORMATS: Final = ("glb", "gltf", "usda", "usdc", "usdz", "ply", "obj", "czml", "geojson")
 """Formats that a row may request; .glb is always made."""

@@ -12,8 +12,8 @@ import click
 from fig2mesh.conversion.libraries import PACKAGES, version
 from fig2mesh.errors import SYSTEM_LIBRARIES
 from fig2mesh.field.kernel_cache import kernel_folder
-from fig2mesh.processes import run_apart
-from fig2mesh.surroundings import NEEDED_BYTES, address_limit, temporary_fault
+from fig2mesh.system.processes import run_apart
+from fig2mesh.system.surroundings import NEEDED_BYTES, address_limit, temporary_fault
 
 
 @click.command()

@@ -39,7 +39,7 @@ from fig2mesh.conversion.request import (
     OutputOptions,
     PlaceRequest,
 )
-from fig2mesh.surroundings import memory_error, name_error, open_streams, temporary_fault
+from fig2mesh.system.surroundings import memory_error, name_error, open_streams, temporary_fault
 
 GROUPS = {
     "Figure": FigureFiles,

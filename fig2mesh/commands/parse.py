@@ -11,7 +11,7 @@ from fig2mesh.commands.options import messages, request_options
 from fig2mesh.conversion.fields import option, request_class
 from fig2mesh.conversion.request import FigureFiles
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 from fig2mesh.terminal import configure_logging, log, progress
 
 JointFormat = Literal["fig2mesh", "coco", "labelme", "supervisely"]

@@ -13,7 +13,7 @@ from fig2mesh.conversion.place import Placed
 from fig2mesh.conversion.request import Request
 from fig2mesh.settings import Settings
 from fig2mesh.skeleton import PART_NAMES
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 
 
 def asset_of(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from fig2mesh.conversion.request import PlaceRequest
 from fig2mesh.errors import InputError
 from fig2mesh.skeleton import FIGURE_HEIGHT
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 from georef.bearing import parse_facing
 from georef.heights import ellipsoidal_height
 from georef.placement import GeoPlacement

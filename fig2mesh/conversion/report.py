@@ -23,7 +23,7 @@ from fig2mesh.stages.lift import lift
 from fig2mesh.stages.model import model
 from fig2mesh.stages.simplify import simplify
 from fig2mesh.stages.solid import solid
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 
 
 def make_report(

@@ -13,7 +13,7 @@ from fig2mesh.conversion.fields import check_fields, option, request_class
 from fig2mesh.errors import InputError
 from fig2mesh.settings import Closing, Contours, Mesher, Parts, Quality, Settings, Textures, settings_for
 from fig2mesh.skeleton import FIGURE_HEIGHT
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 
 MAX_SEED = 2**31 - 1
 

@@ -14,7 +14,7 @@ from fig2mesh.parse.keypoints import Joints, read_keypoints
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
 from fig2mesh.records import BoolArray, ByteArray, Figure, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES
-from fig2mesh.surroundings import valid_text
+from fig2mesh.system.surroundings import valid_text
 
 if TYPE_CHECKING:
     from fig2mesh.parse.infer import Inference

@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 from exporters.asset import TexturedMesh
-from fig2mesh.processes import run_apart
 from fig2mesh.records import Figure
 from fig2mesh.settings import PRESETS, Settings
 from fig2mesh.skeleton import FIGURE_HEIGHT
+from fig2mesh.system.processes import run_apart
 
 FINEST: Final = replace(PRESETS["fine"], voxel=0.004, spacing=0.005, triangles=120_000)
 """Reference of errors: finer than any value of the sweep, except for the texture, which is as fine."""

@@ -16,7 +16,7 @@ import pytest
 from exporters.errors import ExportError
 from fig2mesh.batch.local_engine import LocalEngine
 from fig2mesh.batch.task import Outcome
-from fig2mesh.processes import ProcessLost, run_apart
+from fig2mesh.system.processes import ProcessLost, run_apart
 from georef.errors import InputError, PlacementError
 from tests.fig2mesh.batch.small import batch_of, task_of
 from tests.node import ROOT
@@ -26,7 +26,7 @@ import multiprocessing.synchronize, os
 def fail(*_, **__): raise OSError(38, "Function not implemented")
 multiprocessing.synchronize.SemLock.__init__ = fail
 print("once")
-from fig2mesh.processes import run_apart
+from fig2mesh.system.processes import run_apart
 print(run_apart(len, "abc"), run_apart(os.getpid) != os.getpid())
 """
 

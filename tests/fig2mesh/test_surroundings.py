@@ -14,13 +14,13 @@ import pytest
 
 from exporters.errors import ExportError
 from exporters.write import check_outputs
-from fig2mesh import surroundings
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.tasks import tasks_of
 from fig2mesh.commands import doctor
 from fig2mesh.commands.main import cli, main
 from fig2mesh.conversion.request import Request
-from fig2mesh.surroundings import memory_error, name_error, temporary_fault, valid_text
+from fig2mesh.system import surroundings
+from fig2mesh.system.surroundings import memory_error, name_error, temporary_fault, valid_text
 from tests.drawn import write_figure
 from tests.node import ROOT
 
