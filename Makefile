@@ -2,7 +2,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# What users get, and with what tests and checks need besides; the second includes the first.
+PLAIN := $(VENV)/.installed-plain
 STAMP := $(VENV)/.installed
+# Build of PyTorch: cpu leaves out CUDA, where the index of those builds can be reached. By default the system's own.
+TORCH ?=
 SYSTEM_LIBRARIES := libgl1 libegl1 libopengl0 libusb-1.0-0
 SYSTEM_INSTALL := apt-get install -y --no-install-recommends $(SYSTEM_LIBRARIES)
 # Long tests run in continuous integration, and here with `make test SLOW=1`.
@@ -21,12 +25,21 @@ help:
 
 setup: system $(STAMP)
 
-$(STAMP): pyproject.toml constraints.txt
+define install
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt uv
-	$(BIN)/python -m uv pip install --quiet --python $(BIN)/python -c constraints.txt -e ".[dev]" || \
-	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	$(if $(TORCH),$(UV_INSTALL) --torch-backend $(TORCH) -e $(1) || )$(UV_INSTALL) -e $(1) || \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e $(1)
+endef
+UV_INSTALL := $(BIN)/python -m uv pip install --quiet --python $(BIN)/python -c constraints.txt
+
+$(PLAIN): pyproject.toml constraints.txt
+	$(call install,.)
 	touch $@
+
+$(STAMP): pyproject.toml constraints.txt
+	$(call install,".[dev]")
+	touch $(PLAIN) $@
 
 # Open3D and MeshLab load four libraries that a minimal Debian does not have.
 system:
@@ -35,7 +48,7 @@ system:
 	    echo "installing $(SYSTEM_LIBRARIES)"; apt-get update -qq && $(SYSTEM_INSTALL) >/dev/null; \
 	  else echo "system libraries are missing; run: sudo $(SYSTEM_INSTALL)" >&2; exit 1; fi; }
 
-demo: setup
+demo: system $(PLAIN)
 	$(BIN)/python examples/place_figure.py build/demo
 
 # Where compiled modules may not be kept, each process that a test starts would compile torch and others anew.

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 from typing import Any
+
+from exporters.errors import ExportError
 
 LONE_SURROGATE = re.compile("[\ud800-\udfff]")
 
@@ -24,3 +27,9 @@ def plain_texts(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return type(value)(map(plain_texts, value))
     return value
+
+
+def check_utf8(path: str | os.PathLike[str]) -> None:
+    """Raise ExportError for a path that is not UTF-8: files refer to each other by name, and USD and GDAL refuse it."""
+    if LONE_SURROGATE.search(os.fspath(path)):
+        raise ExportError(os.fspath(path), "its name is not UTF-8", "choose another name")

@@ -16,7 +16,7 @@ from exporters.gltf.glb import write_glb, write_gltf
 from exporters.obj import write_obj
 from exporters.ply import write_ply
 from exporters.profiles import GENERAL, Profile, suffix_of
-from exporters.text import plain_text
+from exporters.text import check_utf8
 from exporters.tiles.tileset import TilesVersion, content_name, write_tileset
 from exporters.usd.stage import texture_name, write_usd
 
@@ -188,8 +188,7 @@ def check_file(path: OutputPath, main: Path, overwrite: bool) -> None:
     path : the output as given by the user, for messages. Raises ExportError if it cannot.
     """
     name = os.fspath(path)
-    if plain_text(str(main)) != str(main):
-        raise ExportError(name, "its name is not UTF-8, which other files could not refer to", "choose another name")
+    check_utf8(path)
     if main.is_dir():
         raise ExportError(name, "a directory, not a file", "remove it or choose another name")
     if main.exists() and not overwrite:

@@ -33,7 +33,7 @@ def print_outputs(*paths: object) -> None:
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str], object]]:
     """Yield a function that reports the current stage; a progress bar on terminals only."""
-    if quiet or not sys.stderr.isatty():
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
         yield lambda name: None
         return
     from rich.console import Console

@@ -45,6 +45,10 @@ class InputError(Exception):
         self.remedy = one_line(remedy)
         super().__init__(f"{self.source}: {self.finding}; {self.remedy}")
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str]]:
+        # By default from the message alone, with which the error cannot be made again in another process.
+        return type(self), (self.source, self.finding, self.remedy)
+
 
 class PlacementError(InputError):
     """A place on the earth that does not exist or cannot be computed."""

@@ -79,7 +79,7 @@ def test_the_scan_sees_every_way_of_importing(source):
 LAYERS = (
     ("georef",),
     ("exporters",),
-    ("counters", "errors", "settings", "skeleton", "terminal"),
+    ("counters", "errors", "settings", "skeleton", "system", "terminal"),
     ("records", "nets"),
     ("image_frame", "field", "parse"),
     ("asset_frame", "parts", "pose"),

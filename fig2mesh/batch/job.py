@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from exporters.atomic_file import atomic_path, sweep_temporary
 from exporters.gis.time_span import time_span
+from exporters.text import check_utf8, plain_text
 from exporters.tiles.tileset import short_range_warning
 from fig2mesh.batch.collections.read import read_rows
 from fig2mesh.batch.columns import OWN_COLUMNS, fields_by_column
@@ -74,7 +75,7 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
         if request.dry_run:
             log.info("%d rows: %d valid, %d invalid", count, count - tally.failed, tally.failed)
         else:
-            title = request.title or request.collection.stem
+            title = plain_text(request.title or request.collection.stem)
             summary = summarise_apart(
                 Collection(folder, spool, tuple(unknown), title, request.visible_from, request.license)
             )
@@ -114,6 +115,7 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
             (Path(name) / WORK).mkdir()
             yield Path(name)
         return
+    check_utf8(output)
     folder = Path(os.path.abspath(output))
     try:
         (folder / WORK).mkdir(parents=True, exist_ok=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import itertools
+import logging
 import os
 import signal
 import threading
@@ -16,6 +17,7 @@ from typing import Any, Final
 from fig2mesh.batch.engine import StageNotice, lost
 from fig2mesh.batch.row_job import check_row, convert_row
 from fig2mesh.batch.task import Batch, Outcome, RowTask
+from fig2mesh.system.processes import start
 
 # fmt: off
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
@@ -29,6 +31,9 @@ PARENT_S: Final = 1.0
 """Interval at which a worker checks that its parent is alive, seconds."""
 
 
+log = logging.getLogger("fig2mesh")
+
+
 @dataclass
 class _Worker:
     process: Any
@@ -38,7 +43,10 @@ class _Worker:
 
 
 class LocalEngine:
-    """Engine of `jobs` processes; timeout_s : for each row; dry : rows are only checked."""
+    """Engine of `jobs` processes; timeout_s : for each row; dry : rows are only checked.
+
+    Where the system gives no processes, rows are processed in this one, which has no limit of time.
+    """
 
     def __init__(self, batch: Batch, jobs: int, timeout_s: float, dry: bool = False) -> None:
         self._batch, self._jobs, self._timeout_s, self._dry = batch, jobs, timeout_s, dry
@@ -54,6 +62,7 @@ class LocalEngine:
         again: list[RowTask] = []
         deaths: dict[int, int] = {}
         workers: list[_Worker] = []
+        any_begun = False
 
         def give(worker: _Worker) -> bool:
             task = again.pop() if again else next(queue, None)
@@ -65,16 +74,21 @@ class LocalEngine:
                 worker.pipe.send(task)
             return True
 
+        def add() -> bool:
+            try:
+                worker = self._start()
+            except OSError:  # too many processes, too little memory, or not allowed
+                return False
+            workers.append(worker)
+            return give(worker)
+
         def replace(worker: _Worker) -> None:
             workers.remove(worker)
-            workers.append(self._start())
-            give(workers[-1])
+            add()
 
         try:
             for _ in range(self._jobs):
-                worker = self._start()
-                workers.append(worker)
-                if not give(worker):
+                if not add():
                     break
             while busy := {worker.pipe: worker for worker in workers if worker.task is not None}:
                 for pipe in wait(list(busy), timeout=1.0):
@@ -85,6 +99,10 @@ class LocalEngine:
                         message = worker.pipe.recv()
                     except (EOFError, OSError):
                         code = self._end(worker)
+                        if not any_begun:  # no process can run fig2mesh at all
+                            again.append(task)
+                            workers.remove(worker)
+                            continue
                         deaths[task.number] = deaths.get(task.number, 0) + 1
                         if deaths[task.number] < TRIES:
                             again.append(task)
@@ -92,7 +110,9 @@ class LocalEngine:
                             yield _died(task, code)
                         replace(worker)
                         continue
-                    if isinstance(message, Outcome):
+                    if message is None:
+                        any_begun = True
+                    elif isinstance(message, Outcome):
                         give(worker)
                         yield message
                     else:
@@ -104,6 +124,7 @@ class LocalEngine:
                         self._end(worker)
                         yield lost(task, f"took more than {self._timeout_s:g} s; raise --timeout")
                         replace(worker)
+            yield from self._run_here(again, queue)
         finally:
             for worker in workers:
                 if worker.task is not None:
@@ -113,18 +134,22 @@ class LocalEngine:
             for worker in workers:
                 worker.process.join(5)
 
+    def _run_here(self, again: list[RowTask], queue: Iterator[RowTask]) -> Iterator[Outcome | StageNotice]:
+        """Process what no worker could be had for in this process."""
+        for number, task in enumerate(itertools.chain(again, queue)):
+            if not number:
+                log.warning("no worker processes can be started here; rows are processed in this one, one at a time")
+            notices: list[str] = []
+            outcome = check_row(self._batch, task) if self._dry else convert_row(self._batch, task, notices.append)
+            for stage in notices:
+                yield StageNotice(str(os.getpid()), task.number, task.name, stage)
+            yield outcome
+
     def _start(self) -> _Worker:
-        ours, theirs = multiprocessing.Pipe()
-        context = multiprocessing.get_context("spawn")
         threads = max(1, (os.cpu_count() or 1) // self._jobs)
         # Libraries read these when they are loaded, so they are set before a process starts.
         with _environment({name: os.environ.get(name, str(threads)) for name in THREADS}):
-            process = context.Process(
-                target=_work, args=(theirs, self._batch, self._dry, os.getpid()), daemon=True, name="fig2mesh-worker"
-            )
-            process.start()
-        theirs.close()
-        return _Worker(process, ours)
+            return _Worker(*start(_work, self._batch, self._dry, os.getpid(), name="fig2mesh-worker"))
 
     @staticmethod
     def _end(worker: _Worker) -> int:
@@ -159,6 +184,7 @@ def _work(pipe: Connection, batch: Batch, dry: bool, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
     with suppress(EOFError, OSError):
+        pipe.send(None)
         while True:
             task = pipe.recv()
             pipe.send(check_row(batch, task) if dry else convert_row(batch, task, pipe.send))

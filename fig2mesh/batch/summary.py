@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import multiprocessing
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +14,7 @@ from fig2mesh.batch.ledger import WORK, Ledger
 from fig2mesh.batch.row_files import digest_of, files_unchanged
 from fig2mesh.batch.task import RowTask
 from fig2mesh.batch.tasks import read_spool
+from fig2mesh.system.processes import run_apart
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.json_file import parse_json
 
@@ -65,8 +64,7 @@ class Summary:
 
 def summarise_apart(collection: Collection) -> Summary:
     """Run `summarise` in a separate process, so that its memory (about 5 kB per figure) is freed afterwards."""
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        return pool.submit(summarise, collection).result()
+    return run_apart(summarise, collection)
 
 
 def summarise(collection: Collection) -> Summary:

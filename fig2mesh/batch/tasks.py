@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from exporters.file_names import figure_name, name_key, safe_name
+from exporters.text import plain_text
 from fig2mesh.batch.collections.rows import Row
 from fig2mesh.batch.columns import attributes_of, request_of
 from fig2mesh.batch.row_files import FILE_FIELDS
@@ -81,7 +82,7 @@ def _task(row: Row, names: Names, defaults: Mapping[str, Any]) -> RowTask:
     problem = None if row.problem is None else _problem(row.where, row.problem)
     given = values.get("name")
     picture = PurePosixPath(str(values.get("figure", "")).replace("\\", "/"))
-    title = cell_text(given) if given is not None else figure_name(picture) or f"row {row.number}"
+    title = plain_text(cell_text(given) if given is not None else figure_name(picture) or f"row {row.number}")
     wanted = safe_name(title)
     name, number = wanted, 1
     while (taken := names.take(name, row.number, title)) is not None:

@@ -39,6 +39,7 @@ from fig2mesh.conversion.request import (
     OutputOptions,
     PlaceRequest,
 )
+from fig2mesh.system.surroundings import memory_error, name_error, open_streams, temporary_fault
 
 GROUPS = {
     "Figure": FigureFiles,
@@ -48,8 +49,6 @@ GROUPS = {
     "Output": OutputOptions,
 }
 """Sections of the help, and the part of a request that each describes."""
-
-MORE_MEMORY = "free some, raise the limit of the address space (ulimit -v), or use --quality draft"
 
 
 class MainCommandGroup(click.Group):
@@ -164,20 +163,12 @@ def _usage(error: click.ClickException, words: Sequence[str]) -> str:
 
 
 def _os_error(error: OSError) -> str:
-    """One line for an error of the system: paths fail in more ways than can be listed, temporary folders in one."""
-    if _out_of_memory(error):
-        return f"out of memory; {MORE_MEMORY}"
-    if error.filename is None and "temporary directory" in str(error):
-        return "no temporary folder can be written; set TMPDIR to a folder that can be"
+    """One line for an error of the system: paths fail in more ways than can be listed."""
+    if error.filename is None and (fault := memory_error(error) or temporary_fault()) is not None:
+        return fault
     where = str(error.filename or "a file")
     shown = where if len(where) < 200 else f"{where[:80]}…{where[-80:]}"
     return f"{shown}: {error.strerror or 'cannot be used'}; check the path"
-
-
-def _out_of_memory(error: BaseException) -> bool:
-    """Whether an error comes from too little memory: Python's own, torch's, or of a library that cannot be mapped."""
-    signs = ("failed to map segment", "cannot allocate memory", "can't allocate memory", "bad_alloc")
-    return isinstance(error, MemoryError) or any(sign in str(error).lower() for sign in signs)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -185,6 +176,7 @@ def main(arguments: list[str] | None = None) -> int:
     from georef.errors import InputError
 
     words = sys.argv[1:] if arguments is None else arguments
+    open_streams()
     # Pillow warns about damaged tags, in two lines with its own path; our readers report what matters themselves.
     warnings.filterwarnings("ignore", category=UserWarning, module=r"PIL\.")
     try:
@@ -210,8 +202,8 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:
         if verbosity(words) > 1:
             raise
-        if _out_of_memory(error):
-            click.echo(f"fig2mesh: out of memory; {MORE_MEMORY}", err=True)
+        if (finding := memory_error(error) or name_error(error)) is not None:
+            click.echo(f"fig2mesh: {finding}", err=True)
             return 2
         click.echo(f"fig2mesh: internal error: {type(error).__name__}: {error} (-vv shows where)", err=True)
         return 1

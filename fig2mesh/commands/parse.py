@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from exporters.text import plain_text
 from fig2mesh.commands.options import messages, request_options
 from fig2mesh.conversion.fields import option, request_class
 from fig2mesh.conversion.request import FigureFiles
@@ -79,7 +80,8 @@ def parse_figure(request: ParseRequest) -> None:
     if there and not request.overwrite:
         raise OutputError(request.output / there[0], "already exists", "use --overwrite or choose another folder")
     annotation = annotation_of(read_parsed(**request.reading(), labels=True))
-    for path in write_annotation(request.output, annotation, request.figure.name, request.format, request.overwrite):
+    picture = plain_text(request.figure.name)
+    for path in write_annotation(request.output, annotation, picture, request.format, request.overwrite):
         log.info("%s", path)
 
 

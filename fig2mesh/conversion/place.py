@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from exporters.text import plain_text
 from fig2mesh.conversion.request import PlaceRequest
 from fig2mesh.errors import InputError
 from fig2mesh.skeleton import FIGURE_HEIGHT
@@ -102,7 +103,8 @@ def place(request: PlaceRequest, sheet: MapSheet | None, figure: Figure, path: P
     if request.size_from == "map":
         height = height_on_picture(figure) * location.up_m
         if not drawn_on_it:
-            notes.append(f"--size-from map: a pixel of {path.name} is assumed to be as large as a pixel of the sheet")
+            name = plain_text(path.name)
+            notes.append(f"--size-from map: a pixel of {name} is assumed to be as large as a pixel of the sheet")
     lonlat = location.lon_deg, location.lat_deg
     placement = placement_of(request, lonlat, height=height, viewer_deg=location.down_bearing_deg)
     record = _record(request, sheet, location, pixel)
@@ -168,8 +170,8 @@ def _record(request: PlaceRequest, sheet: MapSheet, location: SheetPlace, pixel:
     quality = sheet.quality
     assert request.map is not None
     return {
-        "sheet": (sheet.picture or sheet.file).name,
-        "georeference": sheet.file.name,
+        "sheet": plain_text((sheet.picture or sheet.file).name),
+        "georeference": plain_text(sheet.file.name),
         "crs": sheet.crs,
         "method": sheet.method,
         "fitted_in": sheet.plane.name,

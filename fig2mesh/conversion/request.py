@@ -259,7 +259,7 @@ class Request(FigureFiles, PlaceRequest, InferenceOptions, MeshOptions, OutputOp
     @property
     def title(self) -> str:
         """Name of the figure."""
-        return self.name or figure_name(self.figure.absolute())
+        return plain_text(self.name or figure_name(self.figure.absolute()))
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -11,11 +11,15 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core.caching import FunctionCache
 from numpy.typing import NDArray
+
+from fig2mesh.field.kernel_cache import NOT_KEPT, kernel_folder, warn_once
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -28,8 +32,42 @@ _pools: dict[tuple[int, int], ThreadPoolExecutor] = {}
 
 
 def kernel(function: Function) -> Function:
-    """Compile `function` on first use, keep the machine code on disk, release the interpreter lock."""
-    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    """Compile `function` on first use, keep the machine code on disk if possible, release the interpreter lock."""
+    dispatcher = numba.njit(nogil=True, error_model="numpy")(function)
+    warn_once(kernel_folder().note)
+    if kernel_folder().path is not None:
+        _keep(dispatcher)
+    return cast(Function, dispatcher)
+
+
+class KernelCache(FunctionCache):  # type: ignore[misc]
+    """Cache whose faults cost a compilation, not the run: a full disk, damaged files, a folder that has gone."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled code for a signature, None where there is none to use."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            with suppress(Exception):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled code for a signature."""
+        with suppress(Exception):
+            super().save_overload(sig, data)
+
+
+def _keep(dispatcher: Any) -> None:
+    """Keep compiled code of a kernel in `kernel_folder`; as numba's `enable_caching`, which fails without a folder."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = kernel_folder().numba_dir
+    try:
+        dispatcher._cache = KernelCache(dispatcher.py_func)
+    except (RuntimeError, OSError, ValueError):
+        warn_once(NOT_KEPT)
+    finally:
+        numba.config.CACHE_DIR = before
 
 
 def helper(function: Function) -> Function:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from exporters.text import plain_text
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.consistency import (
     Mismatch,
@@ -147,7 +148,7 @@ def read_parsed(
         if part_labels is None:
             parts = found.part_labels
     figure = Figure(
-        name=name or path.stem,
+        name=plain_text(name or path.stem),
         rgba=view.rgba,
         mask=silhouette,
         joints_px=np.clip(joints.points_px, 0, np.array(silhouette.shape[::-1], np.float32)),

@@ -13,6 +13,7 @@ from exporters.asset import TexturedMesh
 from fig2mesh.records import Figure
 from fig2mesh.settings import PRESETS, Settings
 from fig2mesh.skeleton import FIGURE_HEIGHT
+from fig2mesh.system.processes import run_apart
 
 FINEST: Final = replace(PRESETS["fine"], voxel=0.004, spacing=0.005, triangles=120_000)
 """Reference of errors: finer than any value of the sweep, except for the texture, which is as fine."""
@@ -114,13 +115,8 @@ def sweep(paths: Mapping[str, Path | None], knobs: Sequence[str]) -> Iterator[Ru
 
     paths : keyword arguments of `read_figure`, the picture as "path"
     """
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
-
-    context = multiprocessing.get_context("spawn")
     for knob, value, settings in requests(knobs):
-        with ProcessPoolExecutor(1, context) as pool:
-            yield pool.submit(_in_process, dict(paths), knob, value, settings).result()
+        yield run_apart(_in_process, dict(paths), knob, value, settings)
 
 
 def _in_process(paths: dict[str, Any], knob: str, value: str, settings: Settings) -> Run:
