@@ -163,11 +163,11 @@ def _record(
             places += [float(np.linalg.norm(np.array(seen[0]["matrix"])[12:15] - view.asked["farmer"][:3, 3]))]
             count += 1
             continue
-        tallest = [each for each in seen if _volume(each) > 0.5 * max(map(_volume, seen))]
+        bodies = [each for each in seen if "outline" not in (each["name"] or "")]
         # deck.gl does not give the place of a model in a layer: it is known from the picture alone.
         local = client.module == "deck" and key in GLTF
         asked = {"farmer": np.eye(4)} if local else view.asked
-        pairs = matched([transform_of(each, low, high) for each in tallest], asked)
+        pairs = matched([transform_of(each, low, high) for each in bodies], asked)
         count += len(pairs)
         for name, actual in pairs.items():
             place, bearing, height = errors_of(actual, asked[name])
@@ -196,7 +196,3 @@ def _record(
         note=f"{reads['calls']} readbacks, {reads['texels']} texels" if reads["calls"] else "",
     )
 
-
-def _volume(found: dict[str, Any]) -> float:
-    axes = np.array(found["matrix"], float).reshape(4, 4)[:3, :3]
-    return float(np.linalg.norm((np.array(found["high"]) - found["low"]) @ axes))

@@ -5,9 +5,9 @@ A conversion in draft quality takes half a minute on a slow machine, so that pro
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import asdict, dataclass, replace
+import shutil
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 import fig2mesh
 from exporters.asset import Asset
-from exporters.tiles.gather import write_figures
 from exporters.write import write
 from exporters.profiles import profile_named
 from fig2mesh.commands.main import main
-from georef.geodesy import ecef_from_asset, ecef_from_geodetic, geodetic_from_ecef
 from georef.placement import GeoPlacement
 from tests.node import ROOT
 
@@ -141,10 +139,13 @@ def _write_six(asset: Asset, folder: Path) -> None:
 
 def _write_city(folder: Path) -> None:
     """A collection of two, with names that are not ASCII."""
+    (folder / "drawn").mkdir(exist_ok=True)
+    for file in FIGURE.glob("*.*"):
+        shutil.copy(file, folder / "drawn" / file.name)
     rows = ["figure,keypoints,lon,lat,name,quality"]
     for name, lon in (("Bäuerin", 8.5417), ("крестьянин", 8.5427)):
-        rows.append(f"image.png,keypoints.json,{lon},47.3769,{name},draft")
+        rows.append(f"drawn/image.png,drawn/keypoints.json,{lon},47.3769,{name},draft")
     table = folder / "city.csv"
     table.write_text("\n".join(rows), encoding="utf-8")
-    if main(["batch", str(table), "--root", str(FIGURE), "-o", str(folder / "city"), "-q"]):
+    if main(["batch", str(table), "-o", str(folder / "city"), "-q"]):
         raise RuntimeError("batch")

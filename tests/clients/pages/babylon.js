@@ -9,7 +9,9 @@ export async function start(host, { rightHanded }) {
   }
   const { BABYLON } = window;
 
-  window.MeshoptDecoder = MeshoptDecoder; // otherwise it is fetched from another site
+  // Otherwise it is fetched from another site.
+  window.MeshoptDecoder = MeshoptDecoder;
+  BABYLON.MeshoptCompression.Configuration.decoder.url = 'data:text/javascript,';
   const canvas = document.createElement('canvas');
   host.append(canvas);
   const engine = new BABYLON.Engine(canvas, true, { preserveDrawingBuffer: true });

@@ -17,10 +17,10 @@ export async function start(host, { folder }) {
   for (const name of ['globe', 'sun', 'moon']) scene[name].show = false;
   scene.backgroundColor = Color.WHITE;
 
-  const figureOf = (model, name) => model.sceneGraph._runtimeNodes.flatMap((node) => (node?.runtimePrimitives ?? []).map(({ primitive }) => {
+  const figureOf = (model) => model.sceneGraph._runtimeNodes.flatMap((node) => (node?.runtimePrimitives ?? []).map(({ primitive }) => {
     const { min, max } = primitive.attributes.find(({ semantic }) => semantic === 'POSITION');
     const matrix = Matrix4.multiply(model.sceneGraph.computedModelMatrix, node.computedTransform, new Matrix4());
-    return { name: name ?? node.name ?? node._name, matrix: Matrix4.pack(matrix, []), low: Cartesian3.pack(min, []), high: Cartesian3.pack(max, []) };
+    return { name: node._node?.name ?? node._name ?? '', matrix: Matrix4.pack(matrix, []), low: Cartesian3.pack(min, []), high: Cartesian3.pack(max, []) };
   }));
   const modelsIn = (collection) => Array.from({ length: collection.length }, (_, i) => collection.get(i)).flatMap((each) => {
     if (each instanceof Cesium.Model) return each.ready ? [each] : [];
@@ -46,7 +46,7 @@ export async function start(host, { folder }) {
           if (failed.length) throw new Error(failed[0]);
           return tileset.tilesLoaded && selected().length > 0;
         },
-        figures: () => selected().flatMap((tile) => figureOf(tile.content._model, tile._header.content.uri ?? tile._header.content.url)),
+        figures: () => selected().flatMap((tile) => figureOf(tile.content._model)),
       };
     },
     async czml({ url }) {

@@ -59,7 +59,7 @@ export async function start(host) {
           if (error) throw new Error(String(error));
           return layer.state?.tileset3d?.isLoaded() && shown().length > 0;
         },
-        figures: () => shown().flatMap((tile) => figuresIn(tile.content.gltf, tile.content.cartesianModelMatrix).map((each) => ({ ...each, name: decodeURIComponent(tile.contentUrl.split('/').at(-1)) }))),
+        figures: () => shown().flatMap((tile) => figuresIn(tile.content.gltf, tile.content.cartesianModelMatrix)),
       };
     },
   };

@@ -1,4 +1,5 @@
 import '@google/model-viewer/dist/model-viewer.min.js';
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { frames } from './three_scene.js';
 
 const symbolOf = (element, name) => {
@@ -10,6 +11,8 @@ const symbolOf = (element, name) => {
 };
 
 export async function start(host) {
+  window.MeshoptDecoder = MeshoptDecoder;
+  customElements.get('model-viewer').meshoptDecoderLocation = 'data:text/javascript,';
   return {
     async open({ url }) {
       const view = document.createElement('model-viewer');
@@ -19,6 +22,9 @@ export async function start(host) {
         view.addEventListener('error', (event) => failed(new Error(String(event.detail?.sourceError?.message ?? event.detail?.type))));
       });
       view.src = url;
+      const bar = document.createElement('div');
+      bar.slot = 'progress-bar';
+      view.append(bar);
       host.append(view);
       await ready;
       return {
@@ -32,7 +38,7 @@ export async function start(host) {
           });
           await view.updateComplete;
           view.jumpCameraToGoal();
-          await new Promise((done) => { setTimeout(done, 300); });
+          await new Promise((done) => { setTimeout(done, 1000); });
           await frames(5);
           const scene = symbolOf(view, 'scene');
           const found = [];

@@ -24,7 +24,11 @@ const loaders = {
     const geometry = await new PLYLoader().loadAsync(url);
     return new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ vertexColors: true }));
   },
-  usd: (url) => new USDLoader().loadAsync(url),
+  async usd(url) {
+    const root = await new USDLoader().loadAsync(url);
+    window.debugRoot = root;
+    return root;
+  },
 };
 
 async function loaded(texture) {
