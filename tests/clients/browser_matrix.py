@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ TEXELS = 50_000_000
 
 GLTF = ("glb", "gltf", "glb cesiumjs", "glb blender")
 TILES = ("tiles", "tiles 1.0", "tiles cesiumjs", "tiles lods", "six", "six 1.0")
+CESIUM_TWO_YEARS_AGO = ("glb", "glb cesiumjs", "tiles", "tiles 1.0", "tiles lods", "six", "czml")
 KINDS = {"obj": "obj", "ply": "ply", "usda": "usd", "usdc": "usd", "usdz": "usd", "czml": "czml", "geojson": "geojson"}
 
 
@@ -61,7 +63,7 @@ CLIENTS = (
     Client("Babylon.js, right-handed", "babylon", "babylonjs", GLTF, {"rightHanded": True}),
     Client("Babylon.js, left-handed", "babylon", "babylonjs", ("glb",)),
     Client("CesiumJS", "cesium", "cesium", (*GLTF, *TILES, "czml", "geojson"), {"folder": "cesium"}, True),
-    Client("CesiumJS", "cesium", CESIUM_OLD, (*GLTF, *TILES, "czml", "geojson"), {"folder": "cesium_old"}, True),
+    Client("CesiumJS", "cesium", CESIUM_OLD, CESIUM_TWO_YEARS_AGO, {"folder": "cesium_old"}, True),
     Client("model-viewer", "model_viewer", "@google/model-viewer", GLTF),
     Client("deck.gl", "deck", "deck.gl", ("glb", "glb cesiumjs", "tiles", "tiles 1.0", "six", "six 1.0"), globe=True),
     Client("iTowns", "itowns", "itowns", TILES),
@@ -142,8 +144,6 @@ def measure(made: Made, cesium: Path, names: tuple[str, ...] = ()) -> tuple[list
 
 
 def _call(name: str, job: dict[str, Any]) -> dict[str, Any]:
-    import json
-
     return {"evaluate": f"matrix.{name}({json.dumps(job)})"}
 
 

@@ -138,13 +138,12 @@ def _write_six(asset: Asset, folder: Path) -> None:
 
 
 def _write_city(folder: Path) -> None:
-    """A collection of two, with names that are not ASCII."""
+    """A collection of one, with a name that is not ASCII."""
     (folder / "drawn").mkdir(exist_ok=True)
     for file in FIGURE.glob("*.*"):
         shutil.copy(file, folder / "drawn" / file.name)
     rows = ["figure,keypoints,lon,lat,name,quality"]
-    for name, lon in (("Bäuerin", 8.5417), ("крестьянин", 8.5427)):
-        rows.append(f"drawn/image.png,drawn/keypoints.json,{lon},47.3769,{name},draft")
+    rows.append(f"drawn/image.png,drawn/keypoints.json,{PLACE.lon_deg},{PLACE.lat_deg},Bäuerin,draft")
     table = folder / "city.csv"
     table.write_text("\n".join(rows), encoding="utf-8")
     if main(["batch", str(table), "-o", str(folder / "city"), "-q"]):

@@ -10,11 +10,11 @@ export async function start(host, { folder }) {
   const element = document.createElement('div');
   host.append(element);
   const widget = new CesiumWidget(element, {
-    baseLayer: false, skyBox: false, skyAtmosphere: false, contextOptions: { webgl: { preserveDrawingBuffer: true } },
+    useDefaultRenderLoop: false, baseLayer: false, skyBox: false, skyAtmosphere: false, contextOptions: { webgl: { preserveDrawingBuffer: true } },
     creditContainer: document.createElement('div'),
   });
   const { scene } = widget;
-  for (const name of ['globe', 'sun', 'moon']) scene[name].show = false;
+  for (const name of ['globe', 'sun', 'moon']) if (scene[name]) scene[name].show = false;
   scene.backgroundColor = Color.WHITE;
 
   const figureOf = (model) => model.sceneGraph._runtimeNodes.flatMap((node) => (node?.runtimePrimitives ?? []).map(({ primitive }) => {
@@ -73,7 +73,7 @@ export async function start(host, { folder }) {
 
   return {
     version: Cesium.VERSION,
-    end: () => { widget.destroy(); delete window.Cesium; },
+    end: () => { widget.destroy(); },
     async open(job) {
       const output = await kinds[job.kind](job);
       return {
@@ -89,8 +89,8 @@ export async function start(host, { folder }) {
           const half = Math.tan(Angle.toRadians(fov / 2)) * Math.max(1, aspect);
           Object.assign(camera.frustum, { fov: 2 * Math.atan(half), aspectRatio: aspect, near: 0.1 });
           camera.setView({ destination: Cartesian3.unpack(eye), orientation: { direction, up: Cartesian3.cross(right, direction, new Cartesian3()) } });
-          for (let still = 0; still < 5;) {
-            scene.requestRender();
+          for (let still = 0; still < 3;) {
+            widget.clock.tick();
             scene.render();
             await frames(1);
             still = output.ready() ? still + 1 : 0;

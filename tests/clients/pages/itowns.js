@@ -1,15 +1,16 @@
+import * as itowns from 'itowns';
+import * as THREE from 'three';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { frames } from './three_scene.js';
 
 export async function start(host) {
-  const itowns = await import('/modules/itowns/dist/itowns.js');
 
   itowns.enableMeshoptDecoder(MeshoptDecoder);
   const element = document.createElement('div');
   host.append(element);
   const view = new itowns.View('EPSG:4978', element, { noControls: true });
-  view.scene.background = new itowns.THREE.Color('#fff');
-  view.scene.add(new itowns.THREE.AmbientLight('#fff', Math.PI));
+  view.scene.background = new THREE.Color('#fff');
+  view.scene.add(new THREE.AmbientLight('#fff', Math.PI));
   let count = 0;
   return {
     end: () => view.dispose(),

@@ -26,8 +26,9 @@ let opened = null;
 
 const within = (seconds, promise) => {
   let clock;
+  window.fig2mesh.late = false; // ends the loops that wait for something, see `frames`
   const late = new Promise((_, failed) => {
-    clock = setTimeout(() => failed(new Error(`nothing within ${seconds} s`)), 1000 * seconds);
+    clock = setTimeout(() => { window.fig2mesh.late = true; failed(new Error(`nothing within ${seconds} s`)); }, 1000 * seconds);
   });
   return Promise.race([promise, late]).finally(() => clearTimeout(clock));
 };
@@ -50,7 +51,7 @@ window.matrix = {
     client = await module.start(host, options);
     return { version: client.version ?? null };
   }),
-  open: (job, seconds = 60) => guarded(async () => {
+  open: (job, seconds = 20) => guarded(async () => {
     opened?.close?.();
     opened = null;
     Object.assign(reads, { calls: 0, texels: 0, budget: job.texels ?? Infinity });
@@ -58,7 +59,7 @@ window.matrix = {
     opened = await within(seconds, client.open(job));
     return { seconds: (performance.now() - begin) / 1000, reads: { calls: reads.calls, texels: reads.texels } };
   }),
-  look: (camera, seconds = 60) => guarded(async () => {
+  look: (camera, seconds = 20) => guarded(async () => {
     const begin = performance.now();
     const figures = await within(seconds, opened.look(camera));
     const count = { calls: reads.calls, texels: reads.texels };

@@ -1,7 +1,8 @@
 // What the clients that draw with three.js share.
 import * as THREE from 'three';
 
-export const frames = (count) => new Promise((done) => {
+export const frames = (count) => new Promise((done, failed) => {
+  if (window.fig2mesh.late) failed(new Error('too late'));
   const next = (left) => (left ? requestAnimationFrame(() => next(left - 1)) : done());
   next(count);
 });
