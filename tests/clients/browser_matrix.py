@@ -99,18 +99,20 @@ def _with_bearing(camera: dict[str, Any], heading_deg: float) -> dict[str, Any]:
     return camera | {"bearing_deg": (heading_deg + 180.0) % 360.0, "pitch_deg": 0.0}
 
 
-def measure(made: Made, cesium: Path, names: tuple[str, ...] = ()) -> tuple[list[Record], dict[str, bytes]]:
-    """Records and pictures, by client and output, of all clients or of those named by their modules."""
+def measure(
+    made: Made, cesium: Path, modules: tuple[str, ...] = (), outputs: tuple[str, ...] = ()
+) -> tuple[list[Record], dict[str, bytes]]:
+    """Records and pictures, by client and output: of all, or of the named modules and outputs."""
     place = {"lon_deg": PLACE.lon_deg, "lat_deg": PLACE.lat_deg, "height_m": PLACE.height_m}
     place["bearing_deg"] = PLACE.heading_deg
     actions: list[dict[str, Any]] = []
     plan: list[tuple[Client, str | None, _View | None]] = []
     for client in CLIENTS:
-        if names and client.module not in names:
+        if modules and client.module not in modules:
             continue
         actions.append(_call("start", {"client": client.module, "options": client.options}))
         plan.append((client, None, None))
-        for key in client.outputs:
+        for key in outputs or client.outputs:
             kind = KINDS.get(key, "gltf" if key in GLTF else "tiles")
             job = {"kind": kind, "url": f"/files/{OUTPUTS[key].path}", "place": place, "texels": TEXELS}
             actions.append(_call("open", job))
