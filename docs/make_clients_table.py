@@ -49,7 +49,7 @@ def records(folder: Path) -> list[dict[str, Any]]:
 def table(found: list[dict[str, Any]]) -> str:
     """Markdown: a row for each client, with the greatest error of what it opens."""
     lines = [
-        "| client | version | opens | feet off, mm | bearing off, ° | height off, % | colours off, of 255 | does not open |",
+        "| client | version | opens | feet, mm | bearing, ° | height, % | colours, of 255 | does not open |",
         "|---|---|---|---:|---:|---:|---:|---|",
     ]
     for (client, version), group in groupby(found, key=lambda each: (each["client"], each["version"])):

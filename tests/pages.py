@@ -50,7 +50,13 @@ def bundled() -> tuple[Path, Path]:
     command += ["--log-level=error"]
     with alone_in(FOLDER):
         done = subprocess.run(
-            command, capture_output=True, text=True, check=False, cwd=PAGES, env={"NODE_PATH": str(modules)}, timeout=120
+            command,
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=PAGES,
+            env={"NODE_PATH": str(modules)},
+            timeout=120,
         )
     if done.returncode:
         pytest.fail(f"esbuild: {done.stderr[-2000:]}")

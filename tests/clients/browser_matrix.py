@@ -150,7 +150,12 @@ def _call(name: str, job: dict[str, Any]) -> dict[str, Any]:
 
 
 def _record(
-    client: Client, held: str, key: str, opened: dict[str, Any], views: list[tuple[_View, dict[str, Any], bytes]], made: Made
+    client: Client,
+    held: str,
+    key: str,
+    opened: dict[str, Any],
+    views: list[tuple[_View, dict[str, Any], bytes]],
+    made: Made,
 ) -> Record:
     base = {"client": client.name, "version": held, "output": key}
     error = opened.get("error") or next((each["error"] for _, each, _ in views if "error" in each), None)
@@ -197,4 +202,3 @@ def _record(
         figures=count,
         note=f"{reads['calls']} readbacks, {reads['texels']} texels" if reads["calls"] else "",
     )
-

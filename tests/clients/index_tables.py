@@ -48,8 +48,17 @@ def table(path: str) -> dict:
 
 def items(path: str) -> dict:
     found = list(pystac.read_file(path).get_items(recursive=True))
-    missing = [asset.href for item in found for asset in item.get_assets().values() if not Path(asset.get_absolute_href()).exists()]
-    return {"names": [item.properties.get("title", item.id) for item in found], "points": [item.geometry["coordinates"] for item in found], "missing": missing}
+    missing = [
+        asset.href
+        for item in found
+        for asset in item.get_assets().values()
+        if not Path(asset.get_absolute_href()).exists()
+    ]
+    return {
+        "names": [item.properties.get("title", item.id) for item in found],
+        "points": [item.geometry["coordinates"] for item in found],
+        "missing": missing,
+    }
 
 
 def plain(path: str) -> list:
@@ -58,7 +67,12 @@ def plain(path: str) -> list:
 
 def frame(path: str) -> dict:
     rows = stac_geoparquet.to_geodataframe(plain(path))
-    return {"names": list(rows.get("title", rows["id"])), "points": [[p.x, p.y, p.z if p.has_z else None] for p in rows.geometry.centroid] if not all(rows.geometry.geom_type == "Point") else [[p.x, p.y, p.z if p.has_z else None] for p in rows.geometry]}
+    return {
+        "names": list(rows.get("title", rows["id"])),
+        "points": [[p.x, p.y, p.z if p.has_z else None] for p in rows.geometry.centroid]
+        if not all(rows.geometry.geom_type == "Point")
+        else [[p.x, p.y, p.z if p.has_z else None] for p in rows.geometry],
+    }
 
 
 def arrow(path: str) -> dict:

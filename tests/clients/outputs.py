@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 import fig2mesh
 from exporters.asset import Asset
-from exporters.write import write
 from exporters.profiles import profile_named
+from exporters.write import write
 from fig2mesh.commands.main import main
 from georef.placement import GeoPlacement
 from tests.node import ROOT
@@ -27,9 +27,13 @@ PLACE = GeoPlacement(8.5417, 47.3769, 455.34, heading_deg=135.0)
 _METRE = 360 / 4.0075e7
 COLLECTION = {
     "south": replace(PLACE, heading_deg=180.0),
-    "east": replace(PLACE, lon_deg=PLACE.lon_deg + 3 * _METRE / math.cos(math.radians(PLACE.lat_deg)), heading_deg=90.0),
+    "east": replace(
+        PLACE, lon_deg=PLACE.lon_deg + 3 * _METRE / math.cos(math.radians(PLACE.lat_deg)), heading_deg=90.0
+    ),
     "north": replace(PLACE, lat_deg=PLACE.lat_deg + 5 * _METRE, heading_deg=0.0),
-    "west": replace(PLACE, lon_deg=PLACE.lon_deg - 4 * _METRE / math.cos(math.radians(PLACE.lat_deg)), heading_deg=270.0),
+    "west": replace(
+        PLACE, lon_deg=PLACE.lon_deg - 4 * _METRE / math.cos(math.radians(PLACE.lat_deg)), heading_deg=270.0
+    ),
     "patagonia": GeoPlacement(-67.7, -49.3, 12.0, heading_deg=301.25),
     "antimeridian": GeoPlacement(179.9999, 0.0, 0.0, heading_deg=180.0),
 }

@@ -1,4 +1,4 @@
-"""Every output in every client: place, bearing, size, colours and picture; writes what docs/make_clients_table.py reads."""
+"""Every output in every client: place, bearing, size, colours; writes what docs/make_clients_table.py reads."""
 
 from __future__ import annotations
 
@@ -45,7 +45,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Made:
 def check(record: Record, colours: float = COLOURS) -> None:
     """Fail where a record is beyond a tolerance; None is not compared."""
     assert record.result == "opened", record
-    limits = {"place_m": PLACE_M, "bearing_deg": BEARING_DEG, "height_percent": HEIGHT_PERCENT, "picture_px": PICTURE_PX}
+    limits = {
+        "place_m": PLACE_M,
+        "bearing_deg": BEARING_DEG,
+        "height_percent": HEIGHT_PERCENT,
+        "picture_px": PICTURE_PX,
+    }
     for name, limit in (limits | {"colours": colours}).items():
         value = getattr(record, name)
         assert value is None or value <= limit, f"{name}: {record}"
@@ -62,7 +67,11 @@ def test_pages(files: Made, cesium: Path) -> None:
             continue  # see the next test
         check(record, SMALL_COLOURS if record.output.startswith("six") else COLOURS)
         assert record.figures == (6 if record.output.startswith("six") else 1), record
-        picture = next(png for title, png in pictures.items() if title.startswith(f"{record.client} {record.version} {record.output} "))
+        picture = next(
+            png
+            for title, png in pictures.items()
+            if title.startswith(f"{record.client} {record.version} {record.output} ")
+        )
         if record.overlap is not None and not record.output.startswith("six"):
             assert overlap_of(pixels(base64.b64encode(picture).decode()), mirrored=True) < record.overlap - 0.1, record
 
@@ -71,7 +80,9 @@ DECK_READS_EACH_VERTEX = ("glb", "glb cesiumjs", "tiles", "six")
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=False, reason="the default file has a property texture, which loaders.gl reads for each vertex")
+@pytest.mark.xfail(
+    strict=False, reason="the default file has a property texture, which loaders.gl reads for each vertex"
+)
 @pytest.mark.parametrize("output", DECK_READS_EACH_VERTEX)
 def test_no_texture_is_read_for_each_vertex(files: Made, cesium: Path, output: str) -> None:
     (record,) = browser_matrix.measure(files, cesium, ("deck",), (output,))[0]
@@ -151,7 +162,11 @@ def test_tables(files: Made) -> None:
         result = "refused" if "error" in each else "opened"
         place = float(max(away)) if away else None
         reader = {"stac arrow": " (arrow)", "stac geodataframe": " (GeoDataFrame)"}.get(name, "")
-        records.append(Record(client + reader, version, output, result, place, figures=len(each.get("names", ())) or None, note=note))
+        records.append(
+            Record(
+                client + reader, version, output, result, place, figures=len(each.get("names", ())) or None, note=note
+            )
+        )
     keep("tables", records)
     for name, record in zip(found, records, strict=True):
         if name == "stac geodataframe" and "OutOfBounds" in record.note:
@@ -162,7 +177,13 @@ def test_tables(files: Made) -> None:
 
 
 def _record(
-    client: str, version: str, key: str, box: dict[str, object], picture: np.ndarray | None, asked: np.ndarray, files: Made
+    client: str,
+    version: str,
+    key: str,
+    box: dict[str, object],
+    picture: np.ndarray | None,
+    asked: np.ndarray,
+    files: Made,
 ) -> Record:
     low, high = files.vertices.min(axis=0), files.vertices.max(axis=0)
     place, bearing, height = errors_of(transform_of(box, low, high), asked)

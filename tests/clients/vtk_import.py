@@ -24,7 +24,9 @@ class Messages:
         vtk.vtkOutputWindow.SetInstance(self.window)
 
     def found(self) -> list:
-        return [line for line in self.window.GetOutput().splitlines() if "ERR" in line or "|" in line or "xtension" in line]
+        return [
+            line for line in self.window.GetOutput().splitlines() if "ERR" in line or "|" in line or "xtension" in line
+        ]
 
 
 def seen(path: Path, job: dict, number: int) -> dict:
@@ -50,7 +52,14 @@ def seen(path: Path, job: dict, number: int) -> dict:
         x0, x1, y0, y1, z0, z1 = each.GetMapper().GetInput().GetBounds()
         matrix = each.GetUserMatrix() or vtk.vtkMatrix4x4()
         columns = [matrix.GetElement(row, column) for column in range(4) for row in range(4)]
-        meshes.append({"matrix": columns, "low": [x0, y0, z0], "high": [x1, y1, z1], "triangles": each.GetMapper().GetInput().GetNumberOfPolys()})
+        meshes.append(
+            {
+                "matrix": columns,
+                "low": [x0, y0, z0],
+                "high": [x1, y1, z1],
+                "triangles": each.GetMapper().GetInput().GetNumberOfPolys(),
+            }
+        )
     camera = vtk.vtkCamera()
     camera.SetPosition(*job["camera"]["eye"])
     camera.SetFocalPoint(*job["camera"]["target"])
