@@ -90,6 +90,7 @@ export async function start(host, { folder }) {
           Object.assign(camera.frustum, { fov: 2 * Math.atan(half), aspectRatio: aspect, near: 0.1 });
           camera.setView({ destination: Cartesian3.unpack(eye), orientation: { direction, up: Cartesian3.cross(right, direction, new Cartesian3()) } });
           for (let still = 0; still < 3;) {
+            widget.resize();
             widget.clock.tick();
             scene.render();
             await frames(1);
