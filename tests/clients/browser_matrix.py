@@ -96,7 +96,7 @@ def _views(client: Client, key: str, made: Made) -> list[_View]:
 
 
 def _with_bearing(camera: dict[str, Any], heading_deg: float) -> dict[str, Any]:
-    return camera | {"bearing_deg": (heading_deg + 180.0) % 360.0, "pitch_deg": 0.0}
+    return camera | {"bearing_deg": (heading_deg + 180.0) % 360.0}
 
 
 def measure(
@@ -185,8 +185,10 @@ def _record(
         world = [np.c_[made.vertices, np.ones(len(made.vertices))] @ matrix.T for matrix in view.asked.values()]
         expected = np.concatenate([view_of(view.camera, points[:, :3]) for points in world])
         box = np.concatenate([expected.min(axis=0), expected.max(axis=0)])
-        edges.append(float(np.abs(box_of(shown(picture)) - box).max()))
         colours.append(colours_off(picture, 12 if len(view.asked) == 1 else 3))
+        if client.module == "deck":
+            continue  # seen from above
+        edges.append(float(np.abs(box_of(shown(picture)) - box).max()))
         if len(view.asked) == 1:
             overlaps.append(overlap_of(picture))
     reads = views[-1][1]["reads"]

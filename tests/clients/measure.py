@@ -89,9 +89,10 @@ def camera_of(matrix: Array, low: Array, high: Array, distance_m: float | None =
         (matrix @ np.append(point, 1.0))[:3] for point in (middle + [0, 0, away], middle, middle + [0, 1, 0])
     )
     camera = {"eye": list(eye), "target": list(target), "up": list(above - target), "fov_deg": FOV_DEG}
+    camera["rows_per_m"] = SIZE[1] / 2 / np.tan(np.radians(FOV_DEG / 2)) / away
     if np.linalg.norm(eye) > 6e6:
-        lon, lat, up = (float(value) for value in geodetic_from_ecef(eye))
-        camera |= {"lon_deg": lon, "lat_deg": lat, "height_m": up}
+        lon, lat, up = (float(value) for value in geodetic_from_ecef(target))
+        camera["seen"] = {"lon_deg": lon, "lat_deg": lat, "height_m": up}
     return camera
 
 

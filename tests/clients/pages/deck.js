@@ -1,4 +1,4 @@
-import { Deck, FirstPersonView } from '@deck.gl/core';
+import { Deck, MapView } from '@deck.gl/core';
 import { Tile3DLayer } from '@deck.gl/geo-layers';
 import { ScenegraphLayer } from '@deck.gl/mesh-layers';
 import { load } from '@loaders.gl/core';
@@ -29,8 +29,8 @@ export async function start(host) {
   let failed = null;
   const deck = await new Promise((done) => {
     const made = new Deck({
-      canvas, width: innerWidth, height: innerHeight, useDevicePixels: false, controller: false, views: [new FirstPersonView({ id: 'view', fovy: 20, near: 0.1, far: 1000 })],
-      initialViewState: { longitude: 0, latitude: 0 }, onError: (error) => { failed = error; }, layers: [],
+      canvas, width: innerWidth, height: innerHeight, useDevicePixels: false, controller: false, views: [new MapView({ id: 'view' })],
+      initialViewState: { longitude: 0, latitude: 0, zoom: 1 }, onError: (error) => { failed = error; }, layers: [],
       deviceProps: { type: 'webgl', webgl: { preserveDrawingBuffer: true, antialias: true } }, parameters: { clearColor: [1, 1, 1, 1] },
       onLoad: () => done(made),
     });
@@ -72,8 +72,11 @@ export async function start(host) {
       deck.setProps({ layers: [output.layer] });
       return {
         close: () => deck.setProps({ layers: [] }),
-        async look({ lon_deg: longitude, lat_deg: latitude, height_m: height, bearing_deg: bearing, pitch_deg: pitch, fov_deg: fovy }) {
-          deck.setProps({ initialViewState: { longitude, latitude, position: [0, 0, height], bearing, pitch: -pitch, fovy } });
+        // A map seen from above at 60 degrees, with the figure in its middle.
+        async look({ seen: { lon_deg: longitude, lat_deg: latitude, height_m: height }, bearing_deg: bearing, rows_per_m: rows }) {
+          const zoom = Math.log2((rows * 40075016.7 * Math.cos((latitude * Math.PI) / 180)) / 512);
+          const position = [0, 0, height];
+          deck.setProps({ initialViewState: { longitude, latitude, position, zoom, bearing, pitch: 60, maxZoom: 30, id: `${bearing}` } });
           for (let still = 0; still < 10;) {
             await frames(1);
             deck.redraw('asked');

@@ -5,8 +5,8 @@
 // look(camera, seconds)           draw from a camera: {error} or {figures: [{name, matrix, low, high}], ...}; matrix is
 //                                 column-major, from the coordinates of the file's vertices to those of the client's
 //                                 world: ECEF for placed outputs, the model's own (y up, front +z) for the others
-// A camera is {eye, target, up, fov_deg, lon_deg, lat_deg, height_m, bearing_deg, pitch_deg}, with `eye` in world
-// coordinates and the rest the same eye on the earth.
+// A camera is {eye, target, up, fov_deg, bearing_deg, rows_per_m, seen: {lon_deg, lat_deg, height_m}}, with `eye` and
+// `target` in world coordinates, `seen` the target on the earth.
 const host = document.getElementById('host');
 const reads = { calls: 0, texels: 0, budget: Infinity };
 
