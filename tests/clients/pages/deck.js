@@ -24,14 +24,13 @@ function figuresIn(gltf, matrix) {
 }
 
 export async function start(host) {
-  const canvas = document.createElement('canvas');
-  host.append(canvas);
+  const element = document.createElement('div');
+  host.append(element);
   let failed = null;
   const deck = await new Promise((done) => {
     const made = new Deck({
-      canvas, width: innerWidth, height: innerHeight, useDevicePixels: false, controller: false, views: [new MapView({ id: 'view' })],
+      parent: element, useDevicePixels: false, controller: false, views: [new MapView({ id: 'view' })],
       initialViewState: { longitude: 0, latitude: 0, zoom: 1 }, onError: (error) => { failed = error; }, layers: [],
-      deviceProps: { type: 'webgl', webgl: { preserveDrawingBuffer: true, antialias: true } }, parameters: { clearColor: [1, 1, 1, 1] },
       onLoad: () => done(made),
     });
   });
@@ -79,7 +78,7 @@ export async function start(host) {
           deck.setProps({ initialViewState: { longitude, latitude, position, zoom, bearing, pitch: 60, maxZoom: 30, id: `${bearing}` } });
           for (let still = 0; still < 10;) {
             await frames(1);
-            deck.redraw('asked');
+            
             if (failed) throw failed;
             still = output.ready() ? still + 1 : 0;
           }
