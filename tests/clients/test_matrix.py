@@ -63,8 +63,6 @@ def test_pages(files: Made, cesium: Path) -> None:
     keep("browser", records, pictures)
     assert len(records) == sum(len(client.outputs) for client in browser_matrix.CLIENTS)
     for record in records:
-        if record.client == "deck.gl" and record.output in DECK_READS_EACH_VERTEX and record.result == "refused":
-            continue  # see the next test
         check(record, SMALL_COLOURS if record.output.startswith("six") else COLOURS)
         assert record.figures == (6 if record.output.startswith("six") else 1), record
         picture = next(
