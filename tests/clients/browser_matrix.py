@@ -63,12 +63,14 @@ CLIENTS = (
     Client("Babylon.js, right-handed", "babylon", "babylonjs", GLTF, {"rightHanded": True}),
     Client("Babylon.js, left-handed", "babylon", "babylonjs", ("glb",)),
     Client("CesiumJS", "cesium", "cesium", (*GLTF, *TILES, "czml", "geojson"), {"folder": "cesium"}, True),
-    Client("CesiumJS", "cesium", CESIUM_OLD, CESIUM_TWO_YEARS_AGO, {"folder": "cesium_old"}, True),
     Client("model-viewer", "model_viewer", "@google/model-viewer", GLTF),
     # Of these alone it can be said today that it opens them, see test_no_texture_is_read_for_each_vertex.
     Client("deck.gl", "deck", "deck.gl", ("tiles 1.0", "six 1.0"), globe=True),
     Client("iTowns", "itowns", "itowns", TILES),
 )
+
+OLD = Client("CesiumJS", "cesium", CESIUM_OLD, CESIUM_TWO_YEARS_AGO, {"folder": "cesium_old"}, True)
+"""Not in the matrix yet: it does not finish on the page."""
 
 
 @dataclass(frozen=True)
