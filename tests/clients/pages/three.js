@@ -26,7 +26,6 @@ const loaders = {
   },
   async usd(url) {
     const root = await new USDLoader().loadAsync(url);
-    window.debugRoot = root;
     return root;
   },
 };
