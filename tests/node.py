@@ -35,7 +35,8 @@ def installed(folder: Path, *names: str) -> Path:
             folder.mkdir(parents=True, exist_ok=True)
             manifest.write_text(json.dumps({"private": True, "dependencies": wanted}))
             # No scripts of packages: none is needed, and they would compile a database for minutes.
-            options = ["--ignore-scripts", "--no-audit", "--no-fund", "--no-package-lock"]
+            # No peers: clients ask for different versions of three.js, and those that need another bring it.
+            options = ["--ignore-scripts", "--legacy-peer-deps", "--no-audit", "--no-fund", "--no-package-lock"]
             command = ["npm", "install", "--prefix", str(folder), *options]
             install = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, timeout=600)
             if install.returncode:
@@ -44,8 +45,11 @@ def installed(folder: Path, *names: str) -> Path:
     return modules
 
 
-def runner(modules: Path) -> RunScript:
-    """A function that runs a script of tests/clients with JSON for its stdin and returns its stdout as JSON."""
+def runner(modules: Path, seconds: int = 300) -> RunScript:
+    """A function that runs a script of tests/clients with JSON for its stdin and returns its stdout as JSON.
+
+    seconds : longest time that it may take
+    """
 
     def run(script: str, *arguments: str | Path, stdin: Any = None) -> Any:
         done = subprocess.run(
@@ -54,7 +58,7 @@ def runner(modules: Path) -> RunScript:
             capture_output=True,
             text=True,
             check=True,
-            timeout=300,
+            timeout=seconds,
             env=os.environ | {"NODE_PATH": str(modules)},
         )
         return json.loads(done.stdout)

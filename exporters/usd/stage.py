@@ -137,7 +137,8 @@ def _place(stage: Any, root: Any, placement: GeoPlacement) -> None:
     turn = 180.0 - placement.heading_deg
     # The two operations that Cesium's globe anchor can update when the prim is moved.
     root.AddTranslateOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(0.0))
-    root.AddRotateXYZOp(UsdGeom.XformOp.PrecisionDouble).Set(Gf.Vec3d(0.0, turn, 0.0))
+    # Floats, as UsdGeom.XformCommonAPI wants them: three.js misreads vectors of whole doubles in binary files.
+    root.AddRotateXYZOp(UsdGeom.XformOp.PrecisionFloat).Set(Gf.Vec3f(0.0, turn, 0.0))
 
     place = {"longitude": placement.lon_deg, "latitude": placement.lat_deg, "height": placement.height_m}
     origin = stage.DefinePrim("/CesiumGeoreference", "CesiumGeoreferencePrim")
