@@ -191,8 +191,8 @@ class Asset:
     part_names : label → name for the labels that occur in `TexturedMesh.parts`
     copyright : attribution line, may be empty
     lit : True: clients shade the surface; False: they show its colours unlit, in formats that support it
-    observed_pixels : write the mask of observed texels as well, in formats that support it; the share of each part that
-        it gives is always written. Some clients (loaders.gl) read such a texture once per vertex, for minutes
+    observed_pixels : whether the mask of observed texels is written, in formats that support it; the observed share of
+        each part always is. Some clients (loaders.gl) read such a texture once per vertex, for minutes
     metadata : JSON-serialisable facts about the figure (source, seed, version, observed share ...)
 
     Texts are made representable in UTF-8, see `exporters.text`.

@@ -51,7 +51,6 @@ MANIFOLD = {
     "mergeIndices": INDEX,
     "mergeValues": INDEX,
 }
-
 """EXT_mesh_manifold of a mesh."""
 
 _COLUMN = {"values": Required(INDEX), "stringOffsets": INDEX, "arrayOffsets": INDEX}
@@ -63,7 +62,6 @@ TABLE_METADATA = {
     "propertyTables": [{"class": Required(str), "count": Required(INDEX), "properties": Values(_COLUMN)}],
     "propertyTextures": [{"class": Required(str), "properties": Values({"index": INDEX})}],
 }
-
 """EXT_structural_metadata of a document."""
 
 SURFACE_METADATA = {"propertyTextures": [INDEX]}
@@ -104,7 +102,7 @@ DOCUMENT: dict[str, Any] = {
         {
             "name": str,
             "channels": Required(
-                [{"sampler": Required(INDEX), "target": Required({"node": INDEX, "path": Required(str)})}]
+                [{"sampler": Required(INDEX), "target": Required(_TARGET)}]
             ),
             "samplers": Required([{"input": Required(INDEX), "output": Required(INDEX), "interpolation": str}]),
         }

@@ -17,7 +17,6 @@ ORIENTATION = 274
 """EXIF and TIFF tag. Values: 1 upright, 2 to 8 mirrored or turned."""
 
 XMP_HEAD = b"http://ns.adobe.com/xap/1.0/\0"
-EXIF_HEAD = b"Exif\0\0"
 NAMESPACE = "http://ns.adobe.com/tiff/1.0/"
 
 MAX_XMP = 4 << 20
