@@ -9,6 +9,7 @@ from typing import Any
 from exporters.errors import ExportError
 
 LONE_SURROGATE = re.compile("[\ud800-\udfff]")
+"""Characters that Python puts in place of bytes that are not UTF-8."""
 
 
 def plain_text(text: str) -> str:

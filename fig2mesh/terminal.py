@@ -24,7 +24,7 @@ def configure_logging(quiet: bool, verbose: int) -> None:
 
 
 def print_outputs(*paths: object) -> None:
-    """List files on stdout, one a line, for scripts; nothing with --quiet."""
+    """List files on stdout, one a line, or lines about them, for scripts; nothing with --quiet."""
     if log.isEnabledFor(logging.INFO):
         for path in paths:
             click.echo(os.fsencode(str(path)))  # names of files may be no UTF-8

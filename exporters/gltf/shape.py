@@ -101,9 +101,7 @@ DOCUMENT: dict[str, Any] = {
     "animations": [
         {
             "name": str,
-            "channels": Required(
-                [{"sampler": Required(INDEX), "target": Required(_TARGET)}]
-            ),
+            "channels": Required([{"sampler": Required(INDEX), "target": Required(_TARGET)}]),
             "samplers": Required([{"input": Required(INDEX), "output": Required(INDEX), "interpolation": str}]),
         }
     ],

@@ -24,10 +24,11 @@ from fig2mesh.batch.progress import Tally, watching
 from fig2mesh.batch.request import BatchRequest
 from fig2mesh.batch.row_files import Roots
 from fig2mesh.batch.row_job import FOLDER_KEYS
-from fig2mesh.batch.summary import MANIFEST, Collection, Summary, summarise_apart
+from fig2mesh.batch.summary import MANIFEST, TILESET, Collection, Summary, summarise_apart
 from fig2mesh.batch.task import Batch, Outcome
 from fig2mesh.batch.tasks import TAKEN, check_formats, read_spool, tasks_of, write_spool
 from fig2mesh.errors import InputError, OutputError
+from fig2mesh.terminal import print_outputs
 
 log = logging.getLogger("fig2mesh")
 
@@ -80,6 +81,8 @@ def run(request: BatchRequest, quiet: bool = False, verbose: int = 0) -> int:
                 Collection(folder, spool, tuple(unknown), title, request.visible_from, request.license)
             )
             _log_summary(folder, tally, summary)
+            if request.progress != "json":  # whose events are on stdout
+                print_outputs(folder / (TILESET if summary.figures else MANIFEST))
             if summary.figures and (note := short_range_warning(request.visible_from, summary.tallest_m)):
                 log.warning("%s", note)
         return 0 if not tally.failed else 1 if tally.internal else 2
@@ -115,7 +118,6 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
             (Path(name) / WORK).mkdir()
             yield Path(name)
         return
-    check_utf8(output)
     folder = Path(os.path.abspath(output))
     try:
         (folder / WORK).mkdir(parents=True, exist_ok=True)
@@ -130,7 +132,8 @@ def _folder(output: Path | None, dry_run: bool, overwrite: bool) -> Iterator[Pat
 
 
 def check_output(output: Path, overwrite: bool) -> None:
-    """Raise OutputError for a folder that a batch cannot write into; the same for a run and a dry run."""
+    """Raise OutputError or ExportError for a folder that a batch cannot write into; the same for a dry run."""
+    check_utf8(output)
     folder = Path(os.path.abspath(output))
     if folder.exists() and not folder.is_dir():
         raise OutputError(output, "not a directory", "give -o a folder")
@@ -172,8 +175,7 @@ def _keep_failure(folder: Path, outcome: Outcome) -> None:
 
 def _log_summary(folder: Path, tally: Tally, summary: Summary) -> None:
     log.info(
-        "%s: %d figures: %d converted, %d unchanged, %d failed; %d on the globe",
-        folder,
+        "%d figures: %d converted, %d unchanged, %d failed; %d on the globe",
         tally.total,
         tally.converted,
         tally.unchanged,

@@ -44,9 +44,7 @@ def located(base: Path, text: str, source: str) -> Path:
         raise InputError(source, f"{shown} is a path of Windows, with a drive or a server", HERE)
     if text == "~" or text.startswith(("~/", "~\\")):
         raise InputError(source, f"{shown} begins with ~, which is not expanded in tables", HERE)
-    if "\\" in text:
-        text = text.replace("\\", "/")
-    return _as_on_disk(base / text)
+    return _as_on_disk(base / text.replace("\\", "/"))
 
 
 def _as_on_disk(whole: Path) -> Path:

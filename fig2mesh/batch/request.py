@@ -70,7 +70,7 @@ class BatchRequest:
     license: str | None = option(
         default=None,
         metavar="SPDX|URL",
-        help="License of the figures in the STAC catalogue: an SPDX identifier such as CC-BY-4.0, or the address of "
+        help="Licence of the figures in the STAC catalogue: an SPDX identifier such as CC-BY-4.0, or the address of "
         "its text.",
     )
     visible_from: float | None = option(

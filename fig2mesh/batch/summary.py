@@ -34,7 +34,7 @@ class Collection:
 
     folder : of the outputs; spool : of the tasks; columns : attributes of the user for the indexes, in order
     title : of the collection; visible_from_m : of the tileset, None to derive it from the height of each figure
-    license : SPDX identifier, or address of a text; None if it is not known
+    license : SPDX identifier of the licence, or address of its text; None if it is not known
     """
 
     folder: Path
@@ -143,7 +143,7 @@ def _fill(stage: Path, collection: Collection, figures: Sequence[Any], dates: Se
 
 
 def _license(stage: Path, license: str | None) -> tuple[str, str | None]:
-    """License of the catalogue, and the link that STAC asks for where it has no SPDX identifier."""
+    """Licence of the catalogue, and the link that STAC asks for where it has no SPDX identifier."""
     if license is not None:
         return ("other", license) if ":" in license else (license, None)
     (stage / LICENSE).write_text(NO_LICENSE, encoding="utf-8", newline="\n")

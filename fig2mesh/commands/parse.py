@@ -12,7 +12,7 @@ from fig2mesh.commands.options import messages, request_options
 from fig2mesh.conversion.fields import option, request_class
 from fig2mesh.conversion.request import FigureFiles
 from fig2mesh.errors import InputError, OutputError
-from fig2mesh.terminal import configure_logging, log, progress
+from fig2mesh.terminal import configure_logging, log, print_outputs, progress
 
 if TYPE_CHECKING:
     from fig2mesh.parse.sheet import SheetFigure
@@ -81,8 +81,7 @@ def parse_figure(request: ParseRequest) -> None:
         raise OutputError(request.output / there[0], "already exists", "use --overwrite or choose another folder")
     annotation = annotation_of(read_parsed(**request.reading(), labels=True))
     picture = plain_text(request.figure.name)
-    for path in write_annotation(request.output, annotation, picture, request.format, request.overwrite):
-        log.info("%s", path)
+    print_outputs(*write_annotation(request.output, annotation, picture, request.format, request.overwrite))
 
 
 def parse_sheet(request: ParseRequest, quiet: bool) -> None:
@@ -107,7 +106,7 @@ def parse_sheet(request: ParseRequest, quiet: bool) -> None:
     for name, figure in zip(names, figures, strict=True):
         box = " ".join(map(str, figure.bbox))
         doubts = f"; {'; '.join(figure.found.doubts)}" if figure.found.doubts else ""
-        click.echo(f"{folder / name}: --bbox {box}, confidence {figure.confidence:.2f}{doubts}")
+        print_outputs(f"{folder / name}: --bbox {box}, confidence {figure.confidence:.2f}{doubts}")
     if figures:
         log.info("%s: numbered boxes; %s: input of fig2mesh batch", folder / OVERVIEW, folder / TABLE)
         if georeference is None:

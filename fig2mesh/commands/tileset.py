@@ -9,10 +9,10 @@ import click
 
 from fig2mesh.commands.options import FILE, messages, request_options
 from fig2mesh.conversion.fields import check_fields, option, request_class
-from fig2mesh.terminal import configure_logging, log
+from fig2mesh.terminal import configure_logging, log, print_outputs
 
 MAX_NOTES = 10
-"""Figures that are there twice, named one by one."""
+"""Limit of figures that are there twice and named one by one."""
 
 
 @request_class
@@ -67,4 +67,5 @@ def tileset(request: TilesetRequest, assets: tuple[Path, ...], quiet: bool, verb
         log.warning("%d more figures are there twice", len(written.notes) - MAX_NOTES)
     if note := short_range_warning(request.visible_from, written.tallest_m):
         log.warning("%s", note)
-    log.info("%s: %d figures, %d files", written.files[-1], written.figures, len(written.files))
+    log.info("%d figures, %d files", written.figures, len(written.files))
+    print_outputs(written.files[-1])

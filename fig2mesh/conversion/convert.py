@@ -152,7 +152,7 @@ def convert(
     start = time.perf_counter()
     sheet = sheet or open_map(request)
     placing_s = time.perf_counter() - start
-    drawn = figure or read_figure(**request.reading(), name=request.name, force=request.force)
+    drawn = figure or read_figure(**request.reading(), name=request.title, force=request.force)
     check_person(request.figure, drawn.score, request.force)
     settings = settings_of(request)
     if store is None and request.save_stages is not None:

@@ -18,7 +18,7 @@ import numpy as np
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.annotation_tools import TOOL_FORMATS
 from fig2mesh.parse.joint_names import KNOWN, Point, Repeated, canonical, meanings
-from fig2mesh.parse.labelled_points import LabelledPoints, NotThisFormat
+from fig2mesh.parse.labelled_points import LabelledPoints, NotThisFormat, listed
 from fig2mesh.parse.pose_estimators import POSE_FORMATS
 
 Box = tuple[float, float, float, float]
@@ -36,7 +36,7 @@ class NamedPoints:
 
     points : canonical name → (2,) float64, IMAGE; visible : the same names → whether it is visible
     size : (width, height) of the picture, None where the file does not state it
-    unknown : names that stand for no joint; picture : file name of another picture that the figure is said to be of
+    unknown : names that stand for no joint; picture : file name of another picture that the file names instead
     """
 
     points: dict[str, Point]
@@ -103,9 +103,9 @@ def same_picture(written: str, picture: str) -> bool:
 
 
 def _of_picture(people: Sequence[LabelledPoints], path: Path, picture: str) -> tuple[list[LabelledPoints], str | None]:
-    """Those of a file's figures that are of the picture; and the name of the other picture that they are said to be of.
+    """Figures in a file that belong to the picture; and the other picture that the file names, None if it fits.
 
-    Figures of which the file names no picture may be of any.
+    A figure without the name of a picture may belong to any.
     """
     named = [person for person in people if person.picture]
     if not picture or not named:
@@ -119,7 +119,7 @@ def _of_picture(people: Sequence[LabelledPoints], path: Path, picture: str) -> t
     if rest:
         return rest, None
     if len(others) > 1:
-        found = f"about {len(others)} pictures ({_listed(others, 3)}), none of them {picture}"
+        found = f"about {len(others)} pictures ({listed(others, 3)}), none of them {picture}"
         raise FigureError(path, found, "pass the joints of this picture, or write its file name into the file")
     return list(people), others[0]
 
@@ -128,7 +128,7 @@ def _meant(figures: list[NamedPoints], people: Sequence[LabelledPoints], path: P
     found = [figure for figure in figures if figure.points]
     if not found:
         names = list(dict.fromkeys(name for person in people for name, *_ in person.points))
-        written = f" ({_listed(names, 4)})" if names else ""
+        written = f" ({listed(names, 4)})" if names else ""
         finding = f"no joints with known names{written}"
         raise FigureError(path, finding, "name them head, neck, left_shoulder, … as in docs/command_line.md")
     if len(found) > 1 and bbox is not None:
@@ -179,8 +179,3 @@ def position(value: Any, name: str, path: Path) -> Point:
     if point.shape != (2,) or not (np.abs(point) < 1e9).all():
         raise FigureError(path, f"{name} is {str(value)[:60]}", "give x and y as finite numbers")
     return point
-
-
-def _listed(names: Sequence[str], limit: int) -> str:
-    shown = ", ".join(name[:30] for name in names[:limit])
-    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"

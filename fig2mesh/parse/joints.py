@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from fig2mesh.parse.labelled_points import listed
 from fig2mesh.records import BoolArray, FloatArray
 from fig2mesh.skeleton import JOINT, JOINT_NAMES, LIMB_BONES, LIMB_JOINTS
 
@@ -142,7 +143,7 @@ def doubts(joints: NDArray[np.floating], sure: NDArray[np.floating], visible: Bo
     found = []
     weak = [JOINT_NAMES[i] for i in np.argsort(sure) if visible[i] and sure[i] < CONFIDENCE_THRESHOLD]
     if weak:
-        found.append(f"unsure of {_listed(weak)}")
+        found.append(f"unsure of {listed(weak, 5)}")
     rows = np.flatnonzero(mask.any(axis=1))
     tall = max(int(rows[-1] - rows[0] + 1), 1) if len(rows) else 1
     away = ndimage.distance_transform_edt(~mask)
@@ -151,15 +152,10 @@ def doubts(joints: NDArray[np.floating], sure: NDArray[np.floating], visible: Bo
     row = np.clip(joints[:, 1].astype(int), 0, height - 1)
     outside = [JOINT_NAMES[i] for i in np.flatnonzero(visible & (away[row, column] > 0.03 * tall))]
     if outside:
-        found.append(f"{_listed(outside)} outside the silhouette")
+        found.append(f"{listed(outside, 5)} outside the silhouette")
     for part in MEASURED:
         start, end = LIMB_BONES[part]
         lengths = [float(np.linalg.norm(joints[JOINT[f"{s}_{start}"]] - joints[JOINT[f"{s}_{end}"]])) for s in "lr"]
         if min(lengths) > 0.04 * tall and max(lengths) > MAX_LENGTH_RATIO * min(lengths):
             found.append(f"{part.replace('_', ' ')}s of very different lengths")
     return found
-
-
-def _listed(names: list[str], limit: int = 5) -> str:
-    shown = ", ".join(names[:limit])
-    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -15,7 +15,7 @@ import numpy as np
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.joint_formats import Box, NamedPoints, named_points
 from fig2mesh.parse.joint_names import completed
-from fig2mesh.parse.labelled_points import MIN_VISIBLE
+from fig2mesh.parse.labelled_points import MIN_VISIBLE, listed
 from fig2mesh.parse.standing import fitted
 from fig2mesh.records import BoolArray, DepthOrder, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES, LIMBS
@@ -91,12 +91,12 @@ def read_keypoints(
     missing = [name for name in JOINT_NAMES if name not in joints]
     unknown = [str(name) for name in joints if name not in JOINT_NAMES]
     if missing:
-        found = f"joints missing: {_listed(missing)}"
+        found = f"joints missing: {listed(missing)}"
         if unknown:
-            found += f" (unknown names: {_listed(unknown)})"
+            found += f" (unknown names: {listed(unknown)})"
         raise FigureError(path, found, f"name all 21 joints, null to have one inferred: {', '.join(JOINT_NAMES)}")
     if unknown:
-        raise FigureError(path, f"unknown joints: {_listed(unknown)}", f"use only: {', '.join(JOINT_NAMES)}")
+        raise FigureError(path, f"unknown joints: {listed(unknown)}", f"use only: {', '.join(JOINT_NAMES)}")
     points = np.zeros((len(JOINT_NAMES), 2), np.float32)
     visible = np.zeros(len(JOINT_NAMES), np.bool_)
     empty = tuple(name for name in JOINT_NAMES if _not_annotated(joints[name]))
@@ -132,9 +132,7 @@ def _content(path: Path) -> Any:
         if b"<!DOCTYPE" in data or b"<!ENTITY" in data:  # entities can grow without limit
             raise DamagedFile("an XML file that defines entities")
         return ElementTree.fromstring(data)
-    except ElementTree.ParseError as problem:
-        raise FigureError(path, f"not XML: {problem}", REMEDY) from None
-    except (LookupError, ValueError) as problem:  # an encoding that is not known
+    except (ElementTree.ParseError, LookupError, ValueError) as problem:  # the latter two of an unknown encoding
         raise FigureError(path, f"not XML: {problem}", REMEDY) from None
     except OSError as problem:
         raise FigureError(path, problem.strerror or "cannot be read", REMEDY) from None
@@ -147,9 +145,9 @@ def _from_names(named: NamedPoints, path: Path) -> Joints:
     missing = tuple(name for name in JOINT_NAMES if name not in points)
     there = {str(name): points[name] for name in JOINT_NAMES if name in points}
     if missing and len(there) < MIN_ANNOTATED:
-        found = f"joints missing: {_listed(missing)}"
+        found = f"joints missing: {listed(missing)}"
         if named.unknown:
-            found += f" (unknown names: {_listed(named.unknown)})"
+            found += f" (unknown names: {listed(named.unknown)})"
         remedy = f"add them, or leave out --keypoints; all 21 are: {', '.join(JOINT_NAMES)}"
         raise FigureError(path, found, remedy)
     joints = fitted(there)
@@ -170,8 +168,3 @@ def _visible(mark: float) -> bool:
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and abs(value) < 1e9 and math.isfinite(value)
-
-
-def _listed(names: Sequence[str], limit: int = 6) -> str:
-    shown = ", ".join(name[:30] for name in names[:limit])
-    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -79,3 +79,9 @@ def triples(names: tuple[str, ...], values: list[Any], scored: bool = False) -> 
             continue
         found.append((name, [x, y], isinstance(v, int | float) and v >= limit))
     return tuple(found)
+
+
+def listed(names: Sequence[str], limit: int = 6) -> str:
+    """First few names, and how many more there are, for messages."""
+    shown = ", ".join(name[:30] for name in names[:limit])
+    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"

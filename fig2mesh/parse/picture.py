@@ -32,7 +32,7 @@ TURNS = {
     7: Image.Transpose.TRANSVERSE,
     8: Image.Transpose.ROTATE_90,
 }
-"""Pillow's names of what makes a picture of each EXIF orientation upright."""
+"""Pillow's name of the turn that makes a picture of each orientation upright."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,13 @@ class PictureView:
     """Part of a picture that holds the figure.
 
     rgba : (H, W, 4) uint8; corner : (x, y) of its corner in the picture; size : (width, height) of the whole picture
+    notes : what the picture contradicts itself in, or holds besides, one line each
     """
 
     rgba: ByteArray
     corner: tuple[int, int]
     size: tuple[int, int]
+    notes: tuple[str, ...] = ()
 
     @property
     def window(self) -> tuple[slice, slice]:
@@ -56,19 +58,19 @@ class PictureView:
 def read_view(path: Path, bbox: tuple[int, int, int, int] | None) -> PictureView:
     """Read a picture, or the part of it inside `bbox`; of large pictures only that part is kept in memory.
 
-    Logs what the picture contradicts itself in, or holds besides. Raises FigureError as `read_figure` does.
+    Logs its notes as warnings. Raises FigureError as `read_figure` does.
     """
     if bbox is not None and is_large(path) and (part := _window(path, bbox, colours=True)) is not None:
         pixels, notes, size = part
         _log(path, notes)
-        return PictureView(pixels, bbox[:2], size)
+        return PictureView(pixels, bbox[:2], size, notes)
     rgba, notes = _read(path, "figure", colours=True)
     _log(path, notes)
     height, width = rgba.shape[:2]
     x0, y0, x1, y1 = bbox or (0, 0, width, height)
     if not (0 <= x0 < x1 <= width and 0 <= y0 < y1 <= height):
         raise FigureError("--bbox", f"{x0} {y0} {x1} {y1} is not inside {width}×{height} px", "give X0 Y0 X1 Y1")
-    return PictureView(rgba[y0:y1, x0:x1], (x0, y0), (width, height))
+    return PictureView(rgba[y0:y1, x0:x1], (x0, y0), (width, height), notes)
 
 
 def _window(
@@ -168,7 +170,7 @@ def _rgba(path: Path, header: PictureHeader, colours: bool) -> tuple[ByteArray, 
 
 
 def upright(pixels: ByteArray, orientation: int) -> ByteArray:
-    """(H, W, …) picture turned and mirrored as its EXIF orientation asks for."""
+    """(H, W, …) picture turned and mirrored as its orientation asks for."""
     if orientation >= 5:
         pixels = pixels.swapaxes(0, 1)
     rows = -1 if orientation in (3, 4, 7, 8) else 1
@@ -185,12 +187,10 @@ def read_mask(path: Path | None, view: PictureView) -> BoolArray | None:
         opaque = view.rgba[..., 3] >= 128
         return None if opaque.all() else np.asarray(opaque)
     values = _of_view(path, view)
-    if values is None:
-        values = read_rgba(path, colours=False)
-        if values.shape != view.rgba.shape:
-            width, height = view.size
-            found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
-            raise FigureError(path, found, "pass a mask of the figure's size")
+    if values.shape != view.rgba.shape:
+        width, height = view.size
+        found = f"{values.shape[1]}×{values.shape[0]} px, but the figure has {width}×{height}"
+        raise FigureError(path, found, "pass a mask of the figure's size")
     if (values[..., 3] < 255).any():
         return values[..., 3] >= 128
     grey = values[..., :3].max(axis=2)
@@ -198,16 +198,14 @@ def read_mask(path: Path | None, view: PictureView) -> BoolArray | None:
     return np.asarray(grey >= (128 if grey.max() > 1 else 1))
 
 
-def _of_view(path: Path, view: PictureView) -> ByteArray | None:
-    """Part of another picture in the view's window; None where that picture differs in size from the figure's."""
-    if is_large(path) and view.rgba.shape[:2] != view.size[::-1]:
+def _of_view(path: Path, view: PictureView) -> ByteArray:
+    """(H, W, 4) uint8 part of a mask in the view's window; all of it where it differs in size from the figure's."""
+    if is_large(path) and view.rgba.shape[:2] != view.size[::-1] and size_of(path) == view.size:
         (x, y), (height, width) = view.corner, view.rgba.shape[:2]
-        if size_of(path) != view.size:
-            return None
         if (part := _window(path, (x, y, x + width, y + height), colours=False)) is not None:
             return part[0]
-    values = read_rgba(path, colours=False)
-    return values[view.window] if values.shape[:2] == view.size[::-1] else None
+    values, _ = _read(path, "mask", colours=False)
+    return values[view.window] if values.shape[:2] == view.size[::-1] else values
 
 
 def read_labels(path: Path, view: PictureView) -> ByteArray:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from exporters.file_names import figure_name
 from exporters.text import plain_text
 from fig2mesh.errors import FigureError
 from fig2mesh.parse.consistency import (
@@ -22,6 +23,7 @@ from fig2mesh.parse.consistency import (
     upright_finding,
 )
 from fig2mesh.parse.keypoints import Joints, read_keypoints
+from fig2mesh.parse.labelled_points import listed
 from fig2mesh.parse.missed import detached_pieces, missed_things
 from fig2mesh.parse.person import check_person, person_doubts
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
@@ -69,7 +71,7 @@ class Given:
     silhouette: BoolArray | None
     joints: Joints | None
     part_labels: ByteArray
-    doubts: tuple[str, ...] = field(default=())
+    doubts: tuple[str, ...] = ()
 
 
 def read_figure(
@@ -91,7 +93,7 @@ def read_figure(
     keypoints : joints, see `read_keypoints`
     part_labels : 8-bit single-channel picture of a size as for `mask` with the labels of `PART_NAMES`
     bbox : x0, y0, x1, y1 in IMAGE pixels, x1 and y1 exclusive; everything outside is cut off
-    name : identifier of the figure; default: the file's stem
+    name : identifier of the figure; default: the file's stem, or its folder, see `exporters.file_names.figure_name`
     force : whether a picture is read in which hardly a person is found; its score and doubts say so
 
     Raises
@@ -148,7 +150,7 @@ def read_parsed(
         if part_labels is None:
             parts = found.part_labels
     figure = Figure(
-        name=plain_text(name or path.stem),
+        name=plain_text(name or figure_name(path.absolute())),
         rgba=view.rgba,
         mask=silhouette,
         joints_px=np.clip(joints.points_px, 0, np.array(silhouette.shape[::-1], np.float32)),
@@ -179,7 +181,7 @@ def read_given(
     where = mask if mask is not None else path
     if silhouette is not None and not silhouette.any():
         raise FigureError(where, "the silhouette is empty", "the figure must be opaque, or bright in --mask")
-    doubts: list[str] = []
+    doubts = list(view.notes)
     if joints is not None and keypoints is not None:
         doubts += _logged(keypoints, _notes(joints, path))
         _check_coordinates(keypoints, joints, view)
@@ -223,12 +225,6 @@ def size_remedy(made: tuple[int, int], has: tuple[int, int], window: tuple[int, 
     if made == has[::-1]:
         return f"made before the picture was turned? turn them too, or {remedy}"
     return remedy
-
-
-def listed(names: Sequence[str], limit: int = 6) -> str:
-    """Names in a message, the first few."""
-    shown = ", ".join(name[:30] for name in names[:limit])
-    return shown if len(names) <= limit else f"{shown} and {len(names) - limit} more"
 
 
 def _notes(joints: Joints, picture: Path) -> Iterator[str]:

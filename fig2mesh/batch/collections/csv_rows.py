@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
 
+from exporters.text import LONE_SURROGATE
 from fig2mesh.batch.collections.rows import (
     FIGURE,
     MAX_RECORD,
@@ -35,8 +36,6 @@ NO_TABLE = "give a table whose first line names the columns"
 
 _SEPARATOR_LINE = re.compile(r'"?sep=([,;\t])"?\s*', re.IGNORECASE)
 """First line in which spreadsheets declare the separator."""
-
-_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
 class _TooLong(Exception):
@@ -91,7 +90,7 @@ class _Lines:
             raise InputError(self.path, finding, UTF8) from None
         except OSError as error:
             raise InputError(self.path, f"cannot be read ({error.strerror})", "check the disk") from None
-        if not line.isascii() and (found := _SURROGATE.search(line)):
+        if not line.isascii() and (found := LONE_SURROGATE.search(line)):
             code = ord(found.group())
             what = f"byte 0x{code - 0xDC00:02x}" if self.encoding == "UTF-8" else f"code unit 0x{code:04x}"
             raise InputError(self.path, f"line {self.number + 1}: {what} is not {self.encoding}", UTF8)

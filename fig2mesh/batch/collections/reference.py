@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pyproj import CRS, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from fig2mesh.batch.collections.values import InvalidValue, Point, shown
-
-HAND = "give columns lon and lat"
+from fig2mesh.batch.collections.values import LON_LAT, InvalidValue, Point, shown
 
 
 def to_wgs84(
@@ -23,14 +21,14 @@ def to_wgs84(
     """
     crs = _crs(authority, code, definitions)
     if crs is None:
-        unknown = InvalidValue("unknown reference system of its layer", f"reproject it to WGS 84, or {HAND}")
+        unknown = InvalidValue("unknown reference system of its layer", f"reproject it to WGS 84, or {LON_LAT}")
         return lambda points: [unknown] * len(points)
     flat = _transformer(crs.to_2d(), "EPSG:4326")
     solid = _transformer(crs, "EPSG:4979") if len(crs.axis_info) == 3 else None
 
     def transform(points: Sequence[Point]) -> list[Point | InvalidValue]:
         if flat is None:
-            nothing = InvalidValue(f"no known transformation from {shown(crs.name)} to WGS 84", HAND)
+            nothing = InvalidValue(f"no known transformation from {shown(crs.name)} to WGS 84", LON_LAT)
             return [nothing] * len(points)
         x, y = [each.lon for each in points], [each.lat for each in points]
         lon, lat = flat.transform(x, y)

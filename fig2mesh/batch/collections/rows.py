@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import TypeAlias
 
+from exporters.text import LONE_SURROGATE
 from fig2mesh.batch.collections.values import InvalidValue, Point, shown
 from fig2mesh.batch.collections.wkt import WKT_COLUMNS, is_geometry, wkt_point
 from fig2mesh.conversion.cells import ABSENT, NotNumber, number_of
@@ -67,7 +68,6 @@ MAX_ITEMS = 1_000
 MAX_INTEGER = 1 << 64
 """Identifiers of 64 bits are the largest integers that programs write."""
 
-_SURROGATE = re.compile("[\ud800-\udfff]")
 _UNNAMED = re.compile(r"unnamed: [0-9]+([._][0-9]+)*(_level_[0-9]+)?")
 
 
@@ -119,7 +119,7 @@ def fit_text(text: str) -> str | InvalidValue | None:
     text = text.strip()
     if text in ABSENT:
         return None
-    if not text.isascii() and _SURROGATE.search(text):
+    if not text.isascii() and LONE_SURROGATE.search(text):
         return InvalidValue("bytes that are not UTF-8", "save the text as UTF-8")
     if "\0" in text:
         return InvalidValue("NUL character", "remove it")

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+LON_LAT = "give columns lon and lat"
+"""Remedy for places that cannot be read."""
+
 SHOWN = 40
 """Characters of a value in messages."""
 

@@ -10,12 +10,10 @@ import re
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 
-from fig2mesh.batch.collections.values import InvalidValue, Point, shown
+from fig2mesh.batch.collections.values import LON_LAT, InvalidValue, Point, shown
 
 WKT_COLUMNS = ("wkt", "wkt_geom", "geometry", "geom", "the_geom", "shape")
 """Names of columns of geometries: of GDAL, of QGIS's clipboard, of geopandas, and of databases."""
-
-HAND = "give columns lon and lat"
 
 _GEOMETRY = re.compile(r"(?:SRID\s*=\s*([0-9]+)\s*;)?\s*([A-Z]+?)\s*(ZM|Z|M)?\s*(\(.*\)|EMPTY)", re.I | re.S | re.ASCII)
 _NUMBERS = re.compile(r"[^()\s,]+")
@@ -34,20 +32,20 @@ def wkt_point(text: str) -> Point | InvalidValue | None:
     """
     match = _GEOMETRY.fullmatch(text)
     if match is None:
-        return InvalidValue(f"{shown(text)!r} is not a point as WKT", f"write POINT (LON LAT), or {HAND}")
+        return InvalidValue(f"{shown(text)!r} is not a point as WKT", f"write POINT (LON LAT), or {LON_LAT}")
     srid, kind, flag, rest = match[1], match[2].upper(), (match[3] or "").upper(), match[4]
     if kind not in ("POINT", "MULTIPOINT"):
-        return InvalidValue(f"its geometry is a {kind.title()}", f"give a Point, or {HAND}")
+        return InvalidValue(f"its geometry is a {kind.title()}", f"give a Point, or {LON_LAT}")
     if rest.upper() == "EMPTY":
         return None
     if "," in rest:
-        return InvalidValue(f"its geometry is a MultiPoint of {rest.count(',') + 1:,}", f"give a Point, or {HAND}")
+        return InvalidValue(f"its geometry is a MultiPoint of {rest.count(',') + 1:,}", f"give a Point, or {LON_LAT}")
     try:
         numbers = [float(each) for each in _NUMBERS.findall(rest)]
     except ValueError:
         numbers = []
     if not 2 + len(flag) <= len(numbers) <= (2 + len(flag) if flag else 4):
-        return InvalidValue(f"{shown(text)!r} is not a point as WKT", f"write POINT (LON LAT), or {HAND}")
+        return InvalidValue(f"{shown(text)!r} is not a point as WKT", f"write POINT (LON LAT), or {LON_LAT}")
     if any(map(math.isnan, numbers[:2])):
         return None
     if not all(map(math.isfinite, numbers[:2])):
@@ -58,7 +56,7 @@ def wkt_point(text: str) -> Point | InvalidValue | None:
         (moved,) = _transform(int(srid))([point])
         return moved
     if abs(point.lon) > 180 or abs(point.lat) > 180:
-        remedy = f"put SRID=2056; or the like before it, or transform it (ogr2ogr -t_srs EPSG:4326), or {HAND}"
+        remedy = f"put SRID=2056; or the like before it, or transform it (ogr2ogr -t_srs EPSG:4326), or {LON_LAT}"
         return InvalidValue(f"{shown(text)!r} is not in degrees", remedy)
     return point
 
