@@ -12,11 +12,11 @@ import numpy as np
 from PIL import Image
 
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.libvips import libvips
 from fig2mesh.parse.samples import of_pillow, of_vips, pillow_only
 from fig2mesh.parse.window import MAX_PIXELS, is_large, read_window_of, rgba_of, size_of
 from fig2mesh.records import BoolArray, ByteArray
 from fig2mesh.skeleton import PART_NAMES
+from fig2mesh.system.libvips import libvips
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.image_file import NotAPicture, TooLarge, check_scans, open_header, pillow
 from georef.untrusted.picture_header import PictureHeader, read_header

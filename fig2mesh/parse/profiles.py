@@ -15,8 +15,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fig2mesh.parse.libvips import libvips
 from fig2mesh.records import ByteArray
+from fig2mesh.system.libvips import libvips
 from georef.untrusted.picture_header import PictureHeader
 from georef.untrusted.png_chunks import PngFacts
 

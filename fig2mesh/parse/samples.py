@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fig2mesh.parse.libvips import libvips
 from fig2mesh.parse.profiles import BANDS, Kind, SourceColours, to_bytes, to_srgb
 from fig2mesh.records import ByteArray
+from fig2mesh.system.libvips import libvips
 from georef.untrusted.image_file import pillow
 from georef.untrusted.picture_header import PictureHeader
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.libvips import libvips
 from fig2mesh.parse.profiles import source_colours
 from fig2mesh.parse.samples import Box, Samples, of_vips, open_vips, pillow_only, to_rgba
 from fig2mesh.records import ByteArray
+from fig2mesh.system.libvips import libvips
 from georef.untrusted.damage import DamagedFile
 from georef.untrusted.picture_header import PictureHeader, read_header
 
