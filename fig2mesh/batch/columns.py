@@ -11,14 +11,13 @@ from functools import cache
 from typing import Any
 
 from fig2mesh.batch.collections.rows import Value
+from fig2mesh.batch.collections.values import TO_DEGREES
 from fig2mesh.conversion.fields import RequestField, parse_value, request_fields
 from fig2mesh.conversion.request import Request
 from fig2mesh.errors import InputError
 
 PAIRS = {"lonlat": ("lon", "lat"), "at": ("x", "y")}
 """Fields of two numbers, and the two columns that make up each."""
-
-TO_DEGREES = "ogr2ogr -t_srs EPSG:4326"
 
 # fmt: off
 LIKELY_PLACES = frozenset((

@@ -11,6 +11,7 @@ from PIL import Image
 from fig2mesh.errors import InputError
 from fig2mesh.globe.page import Overlay
 from fig2mesh.parse.picture import read_rgba
+from fig2mesh.parse.window import MAX_PIXELS
 from fig2mesh.records import ByteArray
 from georef.mapsheet import MapSheet, read_sheet
 
@@ -38,6 +39,9 @@ def drape(path: Path, map_crs: str | None, folder: Path, name: str) -> Overlay:
     sheet = read_sheet(path, map_crs=map_crs)
     if sheet.picture is None or not sheet.picture.is_file():
         raise InputError(f"--map {path}", "the picture of the sheet is not here", "give the picture itself")
+    if sheet.size is not None and (pixels := sheet.size[0] * sheet.size[1]) > MAX_PIXELS:
+        finding = f"{pixels / 1e6:.0f} Mpx, more than {MAX_PIXELS / 1e6:.0f} Mpx"
+        raise InputError(f"--map {path}", finding, "give a smaller version with a georeference of its own")
     rgba = read_rgba(sheet.picture)
     rectangle = edges(sheet, rgba.shape[1], rgba.shape[0], path)
     file = folder / f"{name}.png"

@@ -88,7 +88,7 @@ class JointFit(NamedTuple):
         return self.inside >= FITS and SURE_EXTENT <= self.extent <= 1.3
 
 
-class Reduced(NamedTuple):
+class ReducedSilhouette(NamedTuple):
     """Silhouette at working size. away : (h, w) distance of each pixel to it, px of the window; step : px per cell
     low, high : (x, y) of the corners of its box, px of the window"""
 
@@ -112,7 +112,7 @@ class Reduced(NamedTuple):
         return JointFit(float((away <= SLACK * self.extent).mean()), extent)
 
 
-def reduced(mask: BoolArray) -> Reduced:
+def reduced_silhouette(mask: BoolArray) -> ReducedSilhouette:
     """Silhouette at working size; mask : (H, W), not empty"""
     step = max(1, -(-max(mask.shape) // WORKING_PX))
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -121,7 +121,7 @@ def reduced(mask: BoolArray) -> Reduced:
     small = padded.reshape(height, step, width, step).any(axis=(1, 3))
     away = ndimage.distance_transform_edt(~small).astype(np.float32) * step
     low, high = np.array([columns[0], rows[0]], float), np.array([columns[-1] + 1, rows[-1] + 1], float)
-    return Reduced(away, step, low, high)
+    return ReducedSilhouette(away, step, low, high)
 
 
 def coordinate_finding(points: NDArray[np.floating], frame: PictureFrame) -> Mismatch | None:
@@ -166,7 +166,7 @@ def changes(frame: PictureFrame) -> Iterator[Change]:
 
 
 def joint_finding(
-    points: NDArray[np.floating], silhouette: Reduced, frame: PictureFrame, inferred: bool = False
+    points: NDArray[np.floating], silhouette: ReducedSilhouette, frame: PictureFrame, inferred: bool = False
 ) -> Mismatch | None:
     """Mismatch of joints and a silhouette that do not fit together; None where they do.
 
@@ -201,7 +201,7 @@ def joint_finding(
 
 
 def _explained(
-    points: NDArray[np.floating], silhouette: Reduced, corner: NDArray[np.float64], tried: Iterator[Change]
+    points: NDArray[np.floating], silhouette: ReducedSilhouette, corner: NDArray[np.float64], tried: Iterator[Change]
 ) -> Change | None:
     fits = [(change, silhouette.fit(change.apply(points) - corner)) for change in tried]
     given = silhouette.fit(points - corner)
@@ -209,14 +209,14 @@ def _explained(
     return max(good, key=lambda each: each[0])[1] if good else None
 
 
-def _moved(points: NDArray[np.floating], silhouette: Reduced) -> NDArray[np.float64] | None:
+def _moved(points: NDArray[np.floating], silhouette: ReducedSilhouette) -> NDArray[np.float64] | None:
     """(2,) shift that brings the joints into the silhouette, if one does."""
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     shift: NDArray[np.float64] = (silhouette.low + silhouette.high) / 2 - middle
     return shift if silhouette.fit(points + shift).good else None
 
 
-def upright_finding(points: FloatArray, silhouette: Reduced) -> Mismatch | None:
+def upright_finding(points: FloatArray, silhouette: ReducedSilhouette) -> Mismatch | None:
     """Mismatch of joints upside down: the head below the feet; points : (21, 2), px of the window"""
     y = points[:, 1]
     feet = [y[JOINT[f"{side}_{name}"]] for side in SIDES for name in ("ankle", "foot")]

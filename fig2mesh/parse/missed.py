@@ -103,20 +103,17 @@ def missed_things(rgb: ByteArray, mask: BoolArray, corner: tuple[int, int]) -> t
     if not extent:
         return ()
     around = ndimage.binary_dilation(figure, np.ones((3, 3)), iterations=max(3, round(RIM_SHARE * extent)))
-    regions, _ = ndimage.label(drawn_lines(background) & ~around, np.ones((3, 3)))
     room, ground = MAX_AWAY * extent, rows[-1] - GROUND * extent
-    found = []
-    for tall, wide in ndimage.find_objects(regions):
-        box = Box(wide.start, tall.start, wide.stop - wide.start, tall.stop - tall.start)
-        leaves = min(box.x, box.y) <= 1 or wide.stop >= regions.shape[1] - 1 or tall.stop >= regions.shape[0] - 1
-        near = (
-            wide.stop > columns[0] - room
-            and wide.start < columns[-1] + room
-            and tall.stop > rows[0] - room
-            and tall.start < ground
-        )
-        if near and not leaves and max(box.width, box.height) >= MIN_MISSED * extent:
-            found.append(box)
-    found.sort(key=lambda box: (-max(box.width, box.height), box))
+
+    def is_near(box: Box) -> bool:
+        across = columns[0] - room - box.width < box.x < columns[-1] + room
+        return bool(across and rows[0] - room - box.height < box.y < ground)
+
+    def leaves(box: Box) -> bool:
+        right, bottom = box.x + box.width, box.y + box.height
+        return min(box.x, box.y) <= 1 or right >= figure.shape[1] - 1 or bottom >= figure.shape[0] - 1
+
+    drawn = boxes(drawn_lines(background) & ~around, MIN_MISSED * extent)
+    found = [box for box in drawn if is_near(box) and not leaves(box)]
     whole = in_picture(in_picture(found, (0, 0), step), corner, 1)
     return named(whole, "beside the figure, not in the inferred silhouette; if it is the figure's, pass --mask")

@@ -18,7 +18,7 @@ from fig2mesh.parse.consistency import (
     PictureFrame,
     coordinate_finding,
     joint_finding,
-    reduced,
+    reduced_silhouette,
     side_finding,
     upright_finding,
 )
@@ -247,7 +247,7 @@ def _frame(view: PictureView) -> PictureFrame:
 def _joint_findings(
     joints: Joints, silhouette: BoolArray, view: PictureView, inferred: bool = False
 ) -> Iterator[Mismatch | None]:
-    outline = reduced(silhouette)
+    outline = reduced_silhouette(silhouette)
     yield joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
     if not joints.missing:
         yield upright_finding(joints.points_px, outline)

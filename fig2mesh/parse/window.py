@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.profiles import source_colours
+from fig2mesh.parse.profiles import SourceColours, source_colours
 from fig2mesh.parse.samples import Box, Samples, of_vips, open_vips, pillow_only, to_rgba
 from fig2mesh.records import ByteArray
 from fig2mesh.system.libvips import libvips
@@ -82,9 +82,7 @@ def read_window_of(
 
 def rgba_of(samples: Samples, header: PictureHeader, colours: bool) -> tuple[ByteArray, tuple[str, ...]]:
     """(H, W, 4) uint8 of samples, and remarks; colours : convert them to sRGB by the picture's profile."""
-    source = source_colours(header, samples.kind)
-    if not colours:
-        source = type(source)(samples.kind)
+    source = source_colours(header, samples.kind) if colours else SourceColours(samples.kind)
     return to_rgba(samples, source), (*header.notes, *samples.notes, *source.notes)
 
 

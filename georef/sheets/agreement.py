@@ -36,6 +36,9 @@ MIN_RESIZED = 1.02
 AREA_MARGIN, AREA_MARGIN_DEG = 0.25, 0.2
 """Tolerance of the area of a reference system, share of its extent and degrees: maps go beyond borders."""
 
+AUXILIARY_TOLERANCE_PX = 0.6
+"""Difference of the map in an `.aux.xml`, at the corners: conventions differ by half a pixel."""
+
 MAX_STRETCH = 1.3
 """Ratio of the scales of a sheet along and across above which it is reported; paper shrinks by some per cent."""
 
@@ -93,7 +96,7 @@ def picture_notes(picture: Path | None, size: Size | None, original: Size | None
     beside = picture.with_name(picture.name + ".aux.xml")
     if isinstance(georeference, Affine) and beside.is_file():
         other = _geo_transform(beside)
-        if other is not None and not same_map(georeference.matrix, other, size, 0.6):
+        if other is not None and not same_map(georeference.matrix, other, size, AUXILIARY_TOLERANCE_PX):
             notes.append(f"{beside}: its GeoTransform is another map than the one used")
     return notes
 

@@ -71,7 +71,7 @@ def read_picture(path: Path) -> SheetPicture:
         found = _georeferenced(path, size, tags)
     except DamagedFile:
         raise PlacementError(path, "its GeoTIFF tags are damaged", "give an intact GeoTIFF, or a world file") from None
-    return replace(found, notes=header.notes)
+    return replace(found, original=header.original, notes=header.notes)
 
 
 def _georeferenced(path: Path, size: tuple[int, int], tags: dict[int, Any]) -> SheetPicture:

@@ -31,3 +31,20 @@ def decoding(what: str, *kinds: type[Exception]) -> Iterator[None]:
         if isinstance(error, DamagedFile):
             raise
         raise DamagedFile(f"{what} ({reason_of(error)})") from error
+
+
+@contextmanager
+def parsing(what: str) -> Iterator[None]:
+    """Convert all exceptions of a parser to DamagedFile; only calls of the parser belong in the block.
+
+    For parsers that raise exceptions of all kinds for damaged files. Errors of the disk pass through.
+    what : beginning of the message, "damaged picture"
+    """
+    try:
+        yield
+    except DamagedFile:
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise
+        raise DamagedFile(f"{what} ({reason_of(error, 80)})") from error

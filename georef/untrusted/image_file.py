@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from georef.untrusted.damage import DamagedFile, reason_of
+from georef.untrusted.damage import DamagedFile, parsing, reason_of
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -40,25 +40,19 @@ class NotAPicture(DamagedFile):
 def pillow() -> Iterator[None]:
     """Convert all exceptions of Pillow to DamagedFile; only its calls belong in the block.
 
-    Its parsers raise all kinds of exceptions for damaged pictures. Disk errors pass through.
+    Errors of the disk pass through.
     """
     from PIL import Image, UnidentifiedImageError
 
-    try:
-        with warnings.catch_warnings():
-            # The limits here are explicit; Pillow's warning would only repeat them.
-            warnings.simplefilter("ignore")
+    with parsing("damaged picture"), warnings.catch_warnings():
+        # The limits here are explicit; Pillow's warning would only repeat them.
+        warnings.simplefilter("ignore")
+        try:
             yield
-    except Image.DecompressionBombError as error:
-        raise TooLarge(f"more than {2e-6 * (Image.MAX_IMAGE_PIXELS or 0):.0f} Mpx") from error
-    except UnidentifiedImageError as error:
-        raise NotAPicture("not a readable picture") from error
-    except OSError as error:
-        if error.strerror:
-            raise
-        raise DamagedFile(f"damaged picture ({reason_of(error, 80)})") from error
-    except Exception as error:
-        raise DamagedFile(f"damaged picture ({reason_of(error, 80)})") from error
+        except Image.DecompressionBombError as error:
+            raise TooLarge(f"more than {2e-6 * (Image.MAX_IMAGE_PIXELS or 0):.0f} Mpx") from error
+        except UnidentifiedImageError as error:
+            raise NotAPicture("not a readable picture") from error
 
 
 def open_header(source: bytes | Path, formats: tuple[str, ...] = FORMATS) -> Image.Image:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from georef.untrusted.damage import DamagedFile, reason_of
+from georef.untrusted.damage import DamagedFile, parsing
 
 NEW_SUBFILE_TYPE, SUBFILE_TYPE = 254, 255
 REDUCED, MASK = 1, 4
@@ -24,8 +24,10 @@ MAX_VALUES, MAX_BYTES = 100_000, 16 << 20
 """Limits of values of a tag, and of bytes in a profile or packet; strips and tiles, which may be more, are left out."""
 
 BLOBS = frozenset((700, 34675))
+"""Tags of an XMP packet and of an ICC profile."""
 
 LISTS = frozenset((273, 279, 324, 325, 513, 514, 519, 520, 521))
+"""Tags of offsets and lengths of strips, tiles and tables of JPEGs."""
 
 
 @dataclass(frozen=True)
@@ -74,17 +76,8 @@ def _tifffile(path: Path) -> Iterator[Any]:
 
     # Its log repeats what is refused or ignored here.
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
-    try:
-        with tifffile.TiffFile(path) as file:
-            yield file
-    except DamagedFile:
-        raise
-    except OSError as error:
-        if error.strerror:
-            raise
-        raise DamagedFile(f"damaged TIFF ({reason_of(error, 80)})") from error
-    except Exception as error:
-        raise DamagedFile(f"damaged TIFF ({reason_of(error, 80)})") from error
+    with parsing("damaged TIFF"), tifffile.TiffFile(path) as file:
+        yield file
 
 
 def _kind(page: Any) -> int:

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 LON_LAT = "give columns lon and lat"
 """Remedy for places that cannot be read."""
 
+TO_DEGREES = "ogr2ogr -t_srs EPSG:4326"
+"""Command that transforms a table to longitude and latitude, for remedies."""
+
 SHOWN = 40
 """Characters of a value in messages."""
 

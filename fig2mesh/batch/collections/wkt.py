@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 
-from fig2mesh.batch.collections.values import LON_LAT, InvalidValue, Point, shown
+from fig2mesh.batch.collections.values import LON_LAT, TO_DEGREES, InvalidValue, Point, shown
 
 WKT_COLUMNS = ("wkt", "wkt_geom", "geometry", "geom", "the_geom", "shape")
 """Names of columns of geometries: of GDAL, of QGIS's clipboard, of geopandas, and of databases."""
@@ -56,7 +56,7 @@ def wkt_point(text: str) -> Point | InvalidValue | None:
         (moved,) = _transform(int(srid))([point])
         return moved
     if abs(point.lon) > 180 or abs(point.lat) > 180:
-        remedy = f"put SRID=2056; or the like before it, or transform it (ogr2ogr -t_srs EPSG:4326), or {LON_LAT}"
+        remedy = f"put SRID=2056; or the like before it, or transform it ({TO_DEGREES}), or {LON_LAT}"
         return InvalidValue(f"{shown(text)!r} is not in degrees", remedy)
     return point
 
