@@ -101,7 +101,7 @@ def test_whole_numbers_of_any_writing(raw: Any, expected: int) -> None:
         ("height_m", "6ft", "'6ft' has a unit; write the number alone, 6, in the unit of the column"),
         ("height_m", "nan", "'nan' is not a number; give a number with a decimal point"),
         ("height_m", "1_000", "'1_000' is not a number; give a number with a decimal point"),
-        ("evidence", "jein", "column evidence: 'jein' is not a truth value; give true or false"),
+        ("force", "jein", "column force: 'jein' is not a truth value; give true or false"),
     ],
 )
 def test_numbers_that_would_be_guessed_are_refused_by_what_to_write(column: str, raw: str, message: str) -> None:
@@ -117,7 +117,7 @@ def test_numbers_that_would_be_guessed_are_refused_by_what_to_write(column: str,
     + [("FALSO", False), ("Vero", True), (1.0, True), ("0.0", False), ("Off", False), ("T", True)],
 )
 def test_truth_values_of_spreadsheets(raw: Any, expected: bool) -> None:
-    assert request_of({"figure": "a.png", "evidence": raw}, {}, "n").evidence is expected
+    assert request_of({"figure": "a.png", "force": raw}, {}, "n").force is expected
 
 
 @pytest.mark.parametrize(
