@@ -40,7 +40,7 @@ def write_table(
         are columns to fill in
     """
     place = ("map", "x", "y") if feet is not None else ("lon", "lat")
-    columns = ("name", "figure", "bbox", "keypoints", "mask", "part_labels", *place, "score", "doubts")
+    columns = ("name", "figure", "bbox", "keypoints", "mask", "part_labels", *place, "found_score", "found_doubts")
     with (folder / TABLE).open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, columns, lineterminator="\n")
         table.writeheader()
@@ -52,8 +52,8 @@ def write_table(
                 "keypoints": f"{name}/{KEYPOINTS}",
                 "mask": f"{name}/{MASK}",
                 "part_labels": f"{name}/{PART_LABELS}",
-                "score": round(figure.confidence, 3),
-                "doubts": "; ".join(figure.found.doubts),
+                "found_score": round(figure.confidence, 3),
+                "found_doubts": "; ".join(figure.found.doubts),
             }
             if feet is not None:
                 x, y = feet[index]
