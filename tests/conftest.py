@@ -6,8 +6,10 @@ time, from a seed that the first line says; with HYPOTHESIS_SEED=… they are dr
 
 from __future__ import annotations
 
+import logging
 import os
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -38,6 +40,15 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     if reporter is not None and settings.get_current_profile_name() == "random":
         seed = session.config.option.hypothesis_seed
         reporter.write_line(f"random examples: HYPOTHESIS_SEED={seed} draws them again")
+
+
+@pytest.fixture(autouse=True)
+def _untouched_log() -> Iterator[None]:
+    """Undo what a command does to the log, so that the next test finds messages where pytest looks for them."""
+    log = logging.getLogger("fig2mesh")
+    before = log.handlers[:], log.level, log.propagate
+    yield
+    log.handlers[:], log.level, log.propagate = before
 
 
 @pytest.fixture(scope="session")

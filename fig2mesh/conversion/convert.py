@@ -24,7 +24,7 @@ from fig2mesh.conversion.stores import FolderStore, NoStore, Store
 from fig2mesh.errors import InputError
 from fig2mesh.image_frame import image_frame
 from fig2mesh.measure.lost import lost_in_model, lost_specks
-from fig2mesh.parse.person import check_person
+from fig2mesh.parse.checks.person import check_person
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import CleanFigure, clean
 from fig2mesh.records import Figure

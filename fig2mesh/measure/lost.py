@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from exporters.asset import TexturedMesh
 from fig2mesh.measure.model import front_overlap
-from fig2mesh.parse.missed import RIM_SHARE, boxes, extent_of, in_picture, named
+from fig2mesh.parse.checks.missed import RIM_SHARE, boxes, extent_of, in_picture, named
 from fig2mesh.records import Figure
 
 MAX_COMPARED_PX: Final = 768

@@ -45,7 +45,7 @@ class Inference:
 
     @property
     def score(self) -> float:
-        """Mean confidence of the joints, 0-1, see `fig2mesh.parse.person`."""
+        """Mean confidence of the joints, 0-1, see `fig2mesh.parse.checks.person`."""
         return round(float(self.confidence.mean()), 3)
 
 

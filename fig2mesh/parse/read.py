@@ -13,7 +13,7 @@ import numpy as np
 from exporters.file_names import figure_name
 from exporters.text import plain_text
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.consistency import (
+from fig2mesh.parse.checks.consistency import (
     Mismatch,
     PictureFrame,
     coordinate_finding,
@@ -22,12 +22,12 @@ from fig2mesh.parse.consistency import (
     side_finding,
     upright_finding,
 )
+from fig2mesh.parse.checks.missed import detached_pieces, missed_things
+from fig2mesh.parse.checks.person import check_person, person_doubts
+from fig2mesh.parse.checks.silhouette_checks import edge_finding, label_finding, silhouette_finding
 from fig2mesh.parse.keypoints import Joints, read_keypoints
 from fig2mesh.parse.labelled_points import listed
-from fig2mesh.parse.missed import detached_pieces, missed_things
-from fig2mesh.parse.person import check_person, person_doubts
 from fig2mesh.parse.picture import PictureView, on_white, read_labels, read_mask, read_view
-from fig2mesh.parse.silhouette_checks import edge_finding, label_finding, silhouette_finding
 from fig2mesh.parse.standing import moved
 from fig2mesh.records import BoolArray, ByteArray, Figure, FloatArray
 from fig2mesh.skeleton import JOINT_NAMES
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 log = logging.getLogger("fig2mesh")
 
 REMEDY = "inspect the files that `fig2mesh parse` writes, correct keypoints.json or mask.png, and pass them"
+
+FEW = 0.25
+"""Share of joints far outside the picture up to which these are named; more are all wrong in the same way."""
 
 JOINT_SLACK_PX = 1.0
 """Tolerance: joints may lie on the picture's edge, and rounding by annotation tools puts them up to a pixel outside."""
@@ -184,23 +187,20 @@ def read_given(
     doubts = list(view.notes)
     if joints is not None and keypoints is not None:
         doubts += _logged(keypoints, _notes(joints, path))
+        _check_inside(keypoints, joints, view, float(max(shape)), FEW)
+    outline = None if silhouette is None else reduced_silhouette(silhouette)
+    judged = outline is not None and not outline.small
+    if joints is not None and keypoints is not None and (judged or outline is None):
         _check_coordinates(keypoints, joints, view)
     if silhouette is not None:
         doubts += _settled(where, _silhouette_findings(silhouette, view, mask is not None))
-        if joints is not None and keypoints is not None:
+        if joints is not None and keypoints is not None and judged:
             doubts += _settled(keypoints, _joint_findings(joints, silhouette, view))
         if part_labels is not None:
             points = None if joints is None else joints.points_px
             doubts += _settled(part_labels, [label_finding(known, silhouette, points)])
-    if joints is not None:
-        size = np.array(shape[::-1], np.float32)
-        outside = ((joints.points_px < -JOINT_SLACK_PX) | (joints.points_px > size + JOINT_SLACK_PX)).any(axis=1)
-        outside &= joints.drawn
-        if outside.any():
-            index = int(np.argmax(outside))
-            x, y = joints.points_px[index]
-            finding = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {shape[1]}×{shape[0]} px"
-            raise FigureError(keypoints, finding, "move it inside, or pass the joints that belong to this picture")
+    if joints is not None and keypoints is not None:
+        _check_inside(keypoints, joints, view)
     return Given(view, silhouette, joints, known, tuple(doubts))
 
 
@@ -234,6 +234,21 @@ def _notes(joints: Joints, picture: Path) -> Iterator[str]:
         yield f"not understood: {listed(joints.unknown)}; write {', '.join(joints.missing[:3])}, …"
 
 
+def _check_inside(
+    path: Path, joints: Joints, view: PictureView, slack_px: float = JOINT_SLACK_PX, most: float = 1.0
+) -> None:
+    """Raise FigureError for a joint so far outside the picture, unless more than a share `most` of the joints are."""
+    height, width = view.rgba.shape[:2]
+    size = np.array([width, height], np.float32)
+    outside = ((joints.points_px < -slack_px) | (joints.points_px > size + slack_px)).any(axis=1)
+    outside &= joints.drawn
+    if outside.any() and outside.sum() <= most * joints.drawn.sum():
+        index = int(np.argmax(outside))
+        x, y = joints.points_px[index]
+        finding = f"{JOINT_NAMES[index]} at ({x:g}, {y:g}) is outside the picture of {width}×{height} px"
+        raise FigureError(path, finding, "move it inside, or pass the joints that belong to this picture")
+
+
 def _check_coordinates(path: Path, joints: Joints, view: PictureView) -> None:
     points = joints.points_px[joints.drawn] + np.array(view.corner, np.float32)
     _settled(path, [coordinate_finding(points, _frame(view))])
@@ -255,7 +270,7 @@ def _joint_findings(
 
 
 def _silhouette_findings(silhouette: BoolArray, view: PictureView, given: bool) -> Iterator[Mismatch | None]:
-    yield silhouette_finding(silhouette, _frame(view))
+    yield silhouette_finding(view.rgba, silhouette, _frame(view))
     if given:  # an alpha channel is a part of its picture
         yield edge_finding(view.rgba, silhouette)
 

@@ -33,14 +33,14 @@ BOX, LABEL = (220, 20, 60), (255, 255, 255)
 def write_table(
     folder: Path, names: Sequence[str], figures: Sequence[SheetFigure], sheet: str, feet: Sequence[Point] | None
 ) -> None:
-    """Write figures.csv: a row for each figure, with its files, its box on the sheet and its score.
+    """Write figures.csv: a row for each figure: its files, its box on the sheet, its score and the doubts.
 
     folder : of the table and of a folder with the annotation of each figure; sheet : path from there
     feet : pixel of the sheet where each stands, if the sheet is a map, for `x` and `y`; else None, and `lon` and `lat`
         are columns to fill in
     """
     place = ("map", "x", "y") if feet is not None else ("lon", "lat")
-    columns = ("name", "figure", "bbox", "keypoints", "mask", "part_labels", *place, "score")
+    columns = ("name", "figure", "bbox", "keypoints", "mask", "part_labels", *place, "found_score", "found_doubts")
     with (folder / TABLE).open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, columns, lineterminator="\n")
         table.writeheader()
@@ -52,7 +52,8 @@ def write_table(
                 "keypoints": f"{name}/{KEYPOINTS}",
                 "mask": f"{name}/{MASK}",
                 "part_labels": f"{name}/{PART_LABELS}",
-                "score": round(figure.confidence, 3),
+                "found_score": round(figure.confidence, 3),
+                "found_doubts": "; ".join(figure.found.doubts),
             }
             if feet is not None:
                 x, y = feet[index]

@@ -249,7 +249,7 @@ def test_too_little_memory_is_one_line(
 
     monkeypatch.setattr("fig2mesh.conversion.outputs.check_request", fail)
     assert main(arguments(files)) == 2
-    assert capfd.readouterr().err.startswith("fig2mesh: out of memory; free some, raise the limit")
+    assert capfd.readouterr().err == "fig2mesh: not enough memory; close other programs, or choose a lower --quality\n"
 
 
 def test_a_missing_temporary_folder_is_one_line(
@@ -258,6 +258,8 @@ def test_a_missing_temporary_folder_is_one_line(
     def fail(*args: object, **options: object) -> None:
         raise FileNotFoundError(2, "No usable temporary directory found in ['/tmp', '/']")
 
-    monkeypatch.setattr("fig2mesh.conversion.outputs.check_request", fail)
-    assert main(arguments(files)) == 2
-    assert "set TMPDIR to a folder that can be" in capfd.readouterr().err
+    with monkeypatch.context() as patch:
+        patch.setattr("fig2mesh.conversion.outputs.check_request", fail)
+        patch.setattr("tempfile.gettempdir", fail)
+        assert main(arguments(files)) == 2
+    assert "set TMPDIR to a writable folder" in capfd.readouterr().err

@@ -15,7 +15,7 @@ from fig2mesh.commands.main import main
 from fig2mesh.measure import lost
 from fig2mesh.measure.lost import lost_specks
 from fig2mesh.measure.model import FrontOverlap
-from fig2mesh.parse.missed import Box, boxes, detached_pieces, missed_things, named
+from fig2mesh.parse.checks.missed import Box, boxes, detached_pieces, missed_things, named
 from fig2mesh.parse.read import read_figure
 from fig2mesh.parts.pieces import clean
 from tests.drawn import write_figure

@@ -18,7 +18,7 @@ from fig2mesh.batch.row_job import convert_row
 from fig2mesh.batch.summary import REPORTED
 from fig2mesh.commands.main import main
 from fig2mesh.errors import FigureError
-from fig2mesh.parse.person import MIN_SCORE, SURE_SCORE, check_person, person_doubts
+from fig2mesh.parse.checks.person import MIN_SCORE, SURE_SCORE, check_person, person_doubts
 from tests.drawn import write_figure
 from tests.fig2mesh.batch.small import QUICK, batch_of, task_of
 

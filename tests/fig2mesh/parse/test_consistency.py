@@ -185,7 +185,7 @@ def test_the_examples_have_no_doubts(name: str) -> None:
     assert read_given(folder / "image.png", keypoints=folder / "keypoints.json").doubts == ()
 
 
-def test_missing_joints_are_inferred_and_the_others_kept(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_missing_joints_are_inferred_and_the_others_kept(tmp_path: Path) -> None:
     content = json.loads((EXAMPLES / "farmer" / "keypoints.json").read_text())
     truth = {name: content["keypoints"][name] for name in ("l_hip", "r_ankle")}
     content["keypoints"] |= {"l_hip": None, "r_ankle": None}
@@ -198,6 +198,5 @@ def test_missing_joints_are_inferred_and_the_others_kept(tmp_path: Path, caplog:
             assert points[name] == pytest.approx(value[:2])
     for name, value in truth.items():
         assert np.linalg.norm(np.subtract(points[name], value[:2])) < 0.06 * 900
-    assert "l_hip, r_ankle inferred" in caplog.text
     assert figure.score is None
     assert any("l_hip, r_ankle inferred" in doubt for doubt in figure.doubts)

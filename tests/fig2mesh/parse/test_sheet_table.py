@@ -66,7 +66,7 @@ def test_the_table_is_a_collection(
         sheet.with_suffix(".prj").write_text("EPSG:2056")
     out = tmp_path / "out"
     (row,) = _write(out, sheet, figure)
-    assert (row["name"], row["figure"], row["score"]) == ("figure_01", sheet.name, "0.877")
+    assert (row["name"], row["figure"], row["found_score"]) == ("figure_01", sheet.name, "0.877")
     assert row["bbox"] == " ".join(map(str, figure.bbox))
     options = ["--parts", "outline", "--dry-run"]
     if georeferenced:

@@ -41,6 +41,9 @@ MAX_EXTENT: Final = 2.5
 MIN_WHOLE: Final = 10
 """Least number of joints whose extent is compared."""
 
+MIN_JUDGED: Final = 24
+"""Width and height of a silhouette, px, below which joints are not compared with it: a pixel is a share of a limb."""
+
 FITS: Final = 0.9
 """Share of changed joints inside the silhouette from which the change explains what is wrong."""
 
@@ -101,6 +104,11 @@ class ReducedSilhouette(NamedTuple):
     def extent(self) -> float:
         return float(np.linalg.norm(self.high - self.low))
 
+    @property
+    def small(self) -> bool:
+        """Whether it is too small to be compared with joints."""
+        return float((self.high - self.low).min()) < MIN_JUDGED
+
     def fit(self, points: NDArray[np.floating]) -> JointFit:
         """JointFit of (N, 2) joints, px of the window."""
         cells = np.asarray(points, np.float64) / self.step
@@ -113,13 +121,13 @@ class ReducedSilhouette(NamedTuple):
 
 
 def reduced_silhouette(mask: BoolArray) -> ReducedSilhouette:
-    """Silhouette at working size; mask : (H, W), not empty"""
+    """Silhouette at working size, without its holes; mask : (H, W), not empty"""
     step = max(1, -(-max(mask.shape) // WORKING_PX))
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     height, width = (-(-length // step) for length in mask.shape)
     padded = np.pad(mask, ((0, height * step - mask.shape[0]), (0, width * step - mask.shape[1])))
     small = padded.reshape(height, step, width, step).any(axis=(1, 3))
-    away = ndimage.distance_transform_edt(~small).astype(np.float32) * step
+    away = ndimage.distance_transform_edt(~ndimage.binary_fill_holes(small)).astype(np.float32) * step
     low, high = np.array([columns[0], rows[0]], float), np.array([columns[-1] + 1, rows[-1] + 1], float)
     return ReducedSilhouette(away, step, low, high)
 
@@ -134,7 +142,7 @@ def coordinate_finding(points: NDArray[np.floating], frame: PictureFrame) -> Mis
     if float(low.min()) >= -1 and float(high.max()) <= 2 and min(frame.size) > 8:
         found = f"all joints lie between {low.min():.3g} and {high.max():.3g}"
         return Mismatch(found, "coordinates from 0 to 1? give pixels", True)
-    if spread < max(2.0, 0.005 * max(frame.window)):
+    if spread < max(2.0, 0.005 * max(frame.window)) and min(frame.size) > 8:
         found = f"all joints lie within {spread:.3g} px of one point"
         return Mismatch(found, "give each joint its own position, in pixels of the picture", True)
     if (low[0] >= 0) and high[1] <= 0 and spread > 2:

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy import ndimage
 
-from fig2mesh.parse.consistency import EXPLAINED_INSIDE, MIN_INSIDE, WORKING_PX, Mismatch, PictureFrame
+from fig2mesh.parse.checks.consistency import EXPLAINED_INSIDE, MIN_INSIDE, WORKING_PX, Mismatch, PictureFrame
 from fig2mesh.parse.picture import on_white
 from fig2mesh.records import BoolArray, ByteArray, FloatArray
 from fig2mesh.skeleton import BODY_PARTS, JOINT, LIMB_BONES, PART, PART_MIRROR, SIDES
@@ -21,6 +21,13 @@ MAX_COVER: Final = 0.97
 
 MAX_RIM: Final = 0.6
 """Share of the picture's rim, with all four corners, that only an inverted silhouette covers."""
+
+SAME_COLOUR: Final = 24.0
+"""Difference of levels up to which two pixels count as one colour."""
+
+MIN_GROUND_RIM: Final = 0.8
+MAX_GROUND: Final = 0.95
+"""Share of the rim, and of the whole picture, that a ground of one colour has at least and at most."""
 
 EDGE_LEVELS: Final = 6.0
 """Steepness of a picture's edge, levels of 255 per pixel."""
@@ -32,20 +39,33 @@ MIN_ON_EDGES: Final = 0.5
 of the given one, and what that has below which it is refused. Those of the figures measured have 1.00."""
 
 
-def silhouette_finding(mask: BoolArray, frame: PictureFrame, inferred: bool = False) -> Mismatch | None:
-    """Mismatch of a silhouette that is inverted, or covers all or hardly any of the picture; mask : (H, W)"""
+def silhouette_finding(rgba: ByteArray, mask: BoolArray, frame: PictureFrame) -> Mismatch | None:
+    """Mismatch of a silhouette that is inverted, or covers all or hardly any of the picture.
+
+    rgba : (H, W, 4); mask : (H, W)
+    """
     cover = float(mask.mean())
     rim = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]])
     corners = mask[[0, 0, -1, -1], [0, -1, 0, -1]].all()
     remedy = "give a silhouette of the figure, bright on dark, or leave it out to have it inferred"
     if cover >= MAX_COVER:
-        return Mismatch(f"the silhouette covers {cover:.1%} of the picture", remedy, not inferred)
+        return Mismatch(f"the silhouette covers {cover:.1%} of the picture", remedy, _has_ground(rgba))
     if corners and float(rim.mean()) > MAX_RIM:
         text = f"the silhouette covers all corners and {rim.mean():.0%} of the picture's rim"
-        return Mismatch(text, f"inverted? {remedy}", not inferred)
+        return Mismatch(text, f"inverted? {remedy}", True)
     if mask.sum() < 100 or (cover < 2e-4 and frame.window == frame.size):
         return Mismatch(f"the silhouette has {int(mask.sum())} px of {mask.size}", remedy, False)
     return None
+
+
+def _has_ground(rgba: ByteArray) -> bool:
+    """Whether the picture's rim is of one colour and other colours are within it, so that it is not all figure."""
+    step = max(1, -(-max(rgba.shape[:2]) // WORKING_PX))
+    small = on_white(rgba[::step, ::step]).astype(np.float32)
+    rim = np.concatenate([small[0], small[-1], small[:, 0], small[:, -1]])
+    near = (np.abs(small - np.median(rim, axis=0)).max(axis=2)) < SAME_COLOUR
+    on_rim = np.concatenate([near[0], near[-1], near[:, 0], near[:, -1]])
+    return bool(on_rim.mean() > MIN_GROUND_RIM and near.mean() < MAX_GROUND)
 
 
 def edge_finding(rgba: ByteArray, mask: BoolArray) -> Mismatch | None:
