@@ -64,9 +64,10 @@ CLIENTS = (
     Client("CesiumJS", "cesium", "cesium", (*GLTF, *TILES, "czml", "geojson"), {"folder": "cesium"}, True),
     Client("CesiumJS", "cesium", CESIUM_OLD, CESIUM_TWO_YEARS_AGO, {"folder": "cesium_old"}, True),
     Client("model-viewer", "model_viewer", "@google/model-viewer", GLTF),
-    Client("deck.gl", "deck", "deck.gl", (*GLTF, "tiles", "tiles 1.0", "six", "six 1.0"), globe=True),
+    Client("deck.gl", "deck", "deck.gl", (*GLTF, *TILES), globe=True),
     Client("iTowns", "itowns", "itowns", TILES),
 )
+
 
 def kind_of(key: str) -> str:
     """How a page opens an output."""
@@ -148,7 +149,7 @@ def measure(
 
 
 def levels_selected(made: Made, cesium: Path, distances: list[float], fov_deg: float, rows: int) -> list[str]:
-    """Names of the files that CesiumJS shows of the tileset of levels, by distance of its box, in a view of some rows."""
+    """Names of the files that CesiumJS shows of the tileset of levels, for each distance of its box, metres."""
     matrix = matrix_of("earth", PLACE)
     low, high = made.vertices.min(axis=0), made.vertices.max(axis=0)
     actions = [_call("start", {"client": "cesium", "options": {"folder": "cesium"}})]

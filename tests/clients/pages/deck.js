@@ -45,8 +45,10 @@ export async function start(host) {
     async gltf({ url: path, place }) {
       const url = new URL(path, location.href).href;
       const gltf = postProcessGLTF(await load(url, GLTFLoader));
+      // By its address, the layer does not load the buffer beside a .gltf.
+      const scenegraph = url.endsWith('.gltf') ? postProcessGLTF(await load(url, GLTFLoader)) : url;
       const layer = new ScenegraphLayer({
-        id: url, data: [place], scenegraph: url, _lighting: 'flat', getPosition: (d) => [d.lon_deg, d.lat_deg, d.height_m],
+        id: url, data: [place], scenegraph, _lighting: 'flat', getPosition: (d) => [d.lon_deg, d.lat_deg, d.height_m],
         getOrientation: (d) => [0, d.bearing_deg - 180, 90], sizeScale: 1,
       });
       return { layer, ready: () => Boolean(layer.isLoaded), figures: () => figuresIn(gltf, new Matrix4()) };
