@@ -18,7 +18,7 @@ export async function start(host, { folder }) {
   for (const name of ['sun', 'moon']) if (scene[name]) scene[name].show = false;
   scene.backgroundColor = Color.WHITE;
 
-  // Light of the sky round a model fills cubes of textures over many frames, which take minutes without a GPU.
+  // Light of the sky round a model fills cubes of textures over many frames: up to ten seconds a tileset without a GPU.
   const environmentMapOptions = { enabled: false };
 
   const figureOf = (model) => model.sceneGraph._runtimeNodes.flatMap((node) => (node?.runtimePrimitives ?? []).map(({ primitive }) => {
