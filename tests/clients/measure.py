@@ -40,6 +40,7 @@ class Record:
     colours : greatest difference, of 255, between the six commonest colours of the drawing and the picture
     seconds : to load and to draw it; no test compares them
     figures : how many were there
+    texels : read back from canvases while it was loaded and drawn
     """
 
     client: str
@@ -54,6 +55,7 @@ class Record:
     colours: float | None = None
     seconds: float | None = None
     figures: int | None = None
+    texels: int | None = None
     note: str = ""
 
 

@@ -61,6 +61,7 @@ OUTPUTS = {
     "gltf": Output(".gltf", "farmer.gltf"),
     "glb cesiumjs": Output(".glb --profile cesiumjs", "cesiumjs/farmer.glb"),
     "glb blender": Output(".glb --profile blender", "blender/farmer.glb"),
+    "glb pixels": Output(".glb --evidence pixels", "pixels/farmer.glb"),
     "obj": Output(".obj", "farmer.obj"),
     "ply": Output(".ply", "farmer.ply"),
     "usda": Output(".usda", "farmer.usda", "stage"),
@@ -120,6 +121,8 @@ def _write(folder: Path) -> NDArray[np.float64]:
     for profile in ("cesiumjs", "blender"):
         (folder / profile).mkdir(exist_ok=True)
         write(asset, folder / profile / "farmer.glb", overwrite=True, profile=profile_named(profile))
+    (folder / "pixels").mkdir(exist_ok=True)
+    write(replace(asset, observed_pixels=True), folder / "pixels" / "farmer.glb", overwrite=True)
     write(asset, folder / "tiles", overwrite=True)
     write(asset, folder / "tiles_10", overwrite=True, tiles_version="1.0")
     write(asset, folder / "tiles_cesiumjs", overwrite=True, profile=profile_named("cesiumjs"))

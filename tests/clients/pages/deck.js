@@ -7,6 +7,12 @@ import { Tiles3DLoader } from '@loaders.gl/3d-tiles';
 import { Matrix4 } from '@math.gl/core';
 import { frames } from './three_scene.js';
 
+// Bounds of an accessor; those of normalized integers are the integers.
+function boundsOf({ min, max, normalized, componentType }) {
+  const one = normalized ? { 5120: 127, 5121: 255, 5122: 32767, 5123: 65535 }[componentType] : 1;
+  return { low: min.map((value) => value / one), high: max.map((value) => value / one) };
+}
+
 // What the nodes of a scene hold, in the frame that `matrix` leads from.
 function figuresIn(gltf, matrix) {
   const visit = (node, above) => {
@@ -17,7 +23,7 @@ function figuresIn(gltf, matrix) {
       if (node.rotation) own.multiplyRight(new Matrix4().fromQuaternion(node.rotation));
       if (node.scale) own.scale(node.scale);
     }
-    const mine = (node.mesh?.primitives ?? []).map(({ attributes: { POSITION: { min, max } } }) => ({ name: node.name, matrix: [...own], low: min, high: max }));
+    const mine = (node.mesh?.primitives ?? []).map(({ attributes: { POSITION } }) => ({ name: node.name, matrix: [...own], ...boundsOf(POSITION) }));
     return [...mine, ...(node.children ?? []).flatMap((child) => visit(child, own))];
   };
   return (gltf.scene ?? gltf.scenes[0]).nodes.flatMap((node) => visit(node, matrix));
@@ -36,10 +42,13 @@ export async function start(host) {
   });
 
   const kinds = {
-    async gltf({ url, place }) {
+    async gltf({ url: path, place }) {
+      const url = new URL(path, location.href).href;
       const gltf = postProcessGLTF(await load(url, GLTFLoader));
+      // By its address, the layer does not load the buffer beside a .gltf.
+      const scenegraph = url.endsWith('.gltf') ? postProcessGLTF(await load(url, GLTFLoader)) : url;
       const layer = new ScenegraphLayer({
-        id: url, data: [place], scenegraph: url, _lighting: 'flat', getPosition: (d) => [d.lon_deg, d.lat_deg, d.height_m],
+        id: url, data: [place], scenegraph, _lighting: 'flat', getPosition: (d) => [d.lon_deg, d.lat_deg, d.height_m],
         getOrientation: (d) => [0, d.bearing_deg - 180, 90], sizeScale: 1,
       });
       return { layer, ready: () => Boolean(layer.isLoaded), figures: () => figuresIn(gltf, new Matrix4()) };
@@ -78,7 +87,6 @@ export async function start(host) {
           deck.setProps({ initialViewState: { longitude, latitude, position, zoom, bearing, pitch: 60, maxZoom: 30, id: `${bearing}` } });
           for (let still = 0; still < 10;) {
             await frames(1);
-            
             if (failed) throw failed;
             still = output.ready() ? still + 1 : 0;
           }

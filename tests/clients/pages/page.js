@@ -6,7 +6,8 @@
 //                                 column-major, from the coordinates of the file's vertices to those of the client's
 //                                 world: ECEF for placed outputs, the model's own (y up, front +z) for the others
 // A camera is {eye, target, up, fov_deg, bearing_deg, rows_per_m, seen: {lon_deg, lat_deg, height_m}}, with `eye` and
-// `target` in world coordinates, `seen` the target on the earth.
+// `target` in world coordinates, `seen` the target on the earth; with `rows`, CesiumJS selects tiles as in a view of so
+// many rows, and figures have the `tile` that they come from.
 const host = document.getElementById('host');
 const reads = { calls: 0, texels: 0, budget: Infinity };
 
@@ -24,13 +25,19 @@ for (const Context of [CanvasRenderingContext2D, OffscreenCanvasRenderingContext
 let client = null;
 let opened = null;
 
-const within = (seconds, promise) => {
+const within = async (seconds, promise) => {
   let clock;
   window.fig2mesh.late = false; // ends the loops that wait for something, see `frames`
   const late = new Promise((_, failed) => {
     clock = setTimeout(() => { window.fig2mesh.late = true; failed(new Error(`nothing within ${seconds} s`)); }, 1000 * seconds);
   });
-  return Promise.race([promise, late]).finally(() => clearTimeout(clock));
+  try {
+    return await Promise.race([promise, late]);
+  } finally {
+    clearTimeout(clock);
+    // Or a loop that is late goes on beside what comes next, which resets the flag.
+    if (window.fig2mesh.late) await Promise.race([promise.catch(() => {}), new Promise((done) => { setTimeout(done, 5000); })]);
+  }
 };
 const guarded = async (act) => {
   try {
@@ -51,7 +58,7 @@ window.matrix = {
     client = await module.start(host, options);
     return { version: client.version ?? null };
   }),
-  open: (job, seconds = 20) => guarded(async () => {
+  open: (job, seconds = 60) => guarded(async () => {
     opened?.close?.();
     opened = null;
     Object.assign(reads, { calls: 0, texels: 0, budget: job.texels ?? Infinity });
@@ -59,7 +66,7 @@ window.matrix = {
     opened = await within(seconds, client.open(job));
     return { seconds: (performance.now() - begin) / 1000, reads: { calls: reads.calls, texels: reads.texels } };
   }),
-  look: (camera, seconds = 20) => guarded(async () => {
+  look: (camera, seconds = 60) => guarded(async () => {
     const begin = performance.now();
     const figures = await within(seconds, opened.look(camera));
     const count = { calls: reads.calls, texels: reads.texels };

@@ -2,9 +2,9 @@
 import * as THREE from 'three';
 
 export const frames = (count) => new Promise((done, failed) => {
-  if (window.fig2mesh.late) failed(new Error('too late'));
+  if (window.fig2mesh.late) return failed(new Error('too late'));
   const next = (left) => (left ? requestAnimationFrame(() => next(left - 1)) : done());
-  next(count);
+  return next(count);
 });
 
 export function placeCamera(camera, { eye, target, up, fov_deg: fov }) {
