@@ -25,6 +25,7 @@ from tests.clients.measure import (
     keep,
     matrix_of,
     overlap_of,
+    shown,
     stage_from_asset,
     transform_of,
 )
@@ -86,6 +87,22 @@ def test_pages(browsed: tuple[list[Record], dict[str, bytes]]) -> None:
         )
         if record.overlap is not None and not record.output.startswith("six"):
             assert overlap_of(pixels(base64.b64encode(picture).decode()), mirrored=True) < record.overlap - 0.1, record
+
+
+@pytest.mark.slow
+def test_deck_shows_models_where_it_shows_tiles(browsed: tuple[list[Record], dict[str, bytes]]) -> None:
+    """It does not give the place of a model in a layer, so that pictures are compared, not cropped."""
+    masks = {
+        record.output: shown(
+            pixels(base64.b64encode(browsed[1][f"deck.gl {record.version} {record.output} 1"]).decode())
+        )
+        for record in browsed[0]
+        if record.client == "deck.gl" and not record.output.startswith("six")
+    }
+    tiles = masks["tiles"]
+    assert tiles.any()
+    overlaps = {output: (mask & tiles).sum() / (mask | tiles).sum() for output, mask in masks.items()}
+    assert min(overlaps.values()) > OVERLAP, overlaps
 
 
 @pytest.mark.slow

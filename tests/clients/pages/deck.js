@@ -49,7 +49,7 @@ export async function start(host) {
       const scenegraph = url.endsWith('.gltf') ? postProcessGLTF(await load(url, GLTFLoader)) : url;
       const layer = new ScenegraphLayer({
         id: url, data: [place], scenegraph, _lighting: 'flat', getPosition: (d) => [d.lon_deg, d.lat_deg, d.height_m],
-        getOrientation: (d) => [0, d.bearing_deg - 180, 90], sizeScale: 1,
+        getOrientation: (d) => [0, 180 - d.bearing_deg, 90], sizeScale: 1,
       });
       return { layer, ready: () => Boolean(layer.isLoaded), figures: () => figuresIn(gltf, new Matrix4()) };
     },
