@@ -101,7 +101,7 @@ def test_whole_numbers_of_any_writing(raw: Any, expected: int) -> None:
         ("height_m", "6ft", "'6ft' has a unit; write the number alone, 6, in the unit of the column"),
         ("height_m", "nan", "'nan' is not a number; give a number with a decimal point"),
         ("height_m", "1_000", "'1_000' is not a number; give a number with a decimal point"),
-        ("evidence", "jein", "column evidence: 'jein' is not a truth value; give true or false"),
+        ("force", "jein", "column force: 'jein' is not a truth value; give true or false"),
     ],
 )
 def test_numbers_that_would_be_guessed_are_refused_by_what_to_write(column: str, raw: str, message: str) -> None:
@@ -117,7 +117,7 @@ def test_numbers_that_would_be_guessed_are_refused_by_what_to_write(column: str,
     + [("FALSO", False), ("Vero", True), (1.0, True), ("0.0", False), ("Off", False), ("T", True)],
 )
 def test_truth_values_of_spreadsheets(raw: Any, expected: bool) -> None:
-    assert request_of({"figure": "a.png", "evidence": raw}, {}, "n").evidence is expected
+    assert request_of({"figure": "a.png", "force": raw}, {}, "n").force is expected
 
 
 @pytest.mark.parametrize(
@@ -288,3 +288,25 @@ def test_encodings_and_separators_of_spreadsheets(tmp_path: Path, data: bytes) -
 def test_other_encodings_are_refused_by_line(tmp_path: Path, coding: str) -> None:
     with pytest.raises(InputError, match=r"line 2: byte 0x.. is not UTF-8; save the table as CSV UTF-8"):
         _read(tmp_path, "figure,name\na.png,Müller\n".encode(coding))
+
+
+@pytest.mark.parametrize(
+    ("lon", "lat", "problem"),
+    [
+        (8.5, 47.3, None),
+        (8.5, 47.305, None),  # rounded
+        (368.5 - 360, 47.3, None),
+        (9.9, 40, "columns lon and lat say 9.9 40, but its geometry is at 8.5 47.3"),
+        (47.3, 8.5, "columns lon and lat say 47.3 8.5, but its geometry is at 8.5 47.3"),
+        (8.5, -47.3, "columns lon and lat say 8.5 -47.3, but its geometry is at 8.5 47.3"),
+        (0, 0, "columns lon and lat say 0 0, but its geometry is at 8.5 47.3"),
+    ],
+)
+def test_a_geometry_that_was_moved_without_its_columns(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, lon: float, lat: float, problem: str | None
+) -> None:
+    place = {"type": "Point", "coordinates": [8.5, 47.3]}
+    feature = {"type": "Feature", "geometry": place, "properties": {"figure": "a.png", "lon": lon, "lat": lat}}
+    (row,) = _read(tmp_path, json.dumps({"type": "FeatureCollection", "features": [feature]}), "t.geojson")
+    assert (row.problem, row.values["lon"], row.values["lat"]) == (None, lon, lat)
+    assert (not caplog.text) if problem is None else (f"{problem}; the columns count" in caplog.text)
