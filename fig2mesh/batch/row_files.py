@@ -37,6 +37,7 @@ class Roots:
             whole = located(self.base, str(path), source)
             real = Path(os.path.realpath(whole, strict=False))
             if not real.is_relative_to(self.root):
+                self._check_relative(column, path, real)
                 straight = Path(os.path.normpath(whole)).is_relative_to(self.base)
                 found = f"{shown} is a link out of {self.root}" if straight else f"{shown} leads out of {self.root}"
                 if not real.exists():
@@ -52,6 +53,16 @@ class Roots:
         except ValueError as error:
             raise InputError(source, f"{shown!r} is not a path ({error})", "check the path") from None
         return whole
+
+    def _check_relative(self, column: str, path: Path, real: Path) -> None:
+        """Raise InputError for a path that is missing from the table's folder, itself outside of `root`."""
+        base = Path(os.path.realpath(self.base))
+        if path.is_absolute() or real.exists() or base.is_relative_to(self.root) or not real.is_relative_to(base):
+            return
+        remedy = f"paths are relative to the folder of the table, {base}; check the path"
+        if (self.root / path).is_file():
+            remedy = f"it is in {self.root}, but {remedy}"
+        raise InputError(f"column {column}", f"{str(path)[:120]} does not exist", remedy)
 
     def shorten(self, text: str) -> str:
         """A message without the common folder of its paths."""

@@ -20,6 +20,7 @@ from fig2mesh.parse.checks.consistency import (
     joint_finding,
     reduced_silhouette,
     side_finding,
+    stray_finding,
     upright_finding,
 )
 from fig2mesh.parse.checks.missed import detached_pieces, missed_things
@@ -263,7 +264,10 @@ def _joint_findings(
     joints: Joints, silhouette: BoolArray, view: PictureView, inferred: bool = False
 ) -> Iterator[Mismatch | None]:
     outline = reduced_silhouette(silhouette)
-    yield joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
+    whole = joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
+    yield whole
+    if whole is None and not inferred:
+        yield stray_finding(joints.points_px, joints.drawn, outline)
     if not joints.missing:
         yield upright_finding(joints.points_px, outline)
         yield side_finding(joints.points_px, joints.visible)

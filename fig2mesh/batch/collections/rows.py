@@ -8,6 +8,7 @@ and `y` are numbers in every kind of file. A column of WKT is the place of a row
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,6 +23,8 @@ from fig2mesh.conversion.cells import ABSENT, NotNumber, number_of
 from fig2mesh.errors import InputError
 
 Value: TypeAlias = "str | int | float | bool | tuple[Value, ...]"
+
+log = logging.getLogger(__name__)
 
 FIGURE = "figure"
 
@@ -46,6 +49,9 @@ PATHS = ("figure", "map")
 
 PLACES = ("lon", "lat", "lonlat", "map")
 """Columns of a place. A row that has one of them does not use its geometry."""
+
+MAX_APART_DEG = 0.01
+"""Difference of the columns `lon` and `lat` from a geometry that rounded columns may have."""
 
 MAX_ROWS = 1_000_000
 """More figures than one tileset or index is useful for: a year of work at thirty seconds each."""
@@ -176,7 +182,7 @@ def make_row(
 
     found : values with the names of their columns, from `column_name`
     problem : found by the reader itself; of several problems the first is reported
-    point : returns the location of its geometry; called only if the values name no place
+    point : returns the location of its geometry; columns of a place come before it, with a warning where they contradict it
     """
     values: dict[str, Value] = {}
     for name, raw in _with_long(found):
@@ -199,9 +205,23 @@ def make_row(
             values.update(lon=place.lon, lat=place.lat)
             if place.altitude is not None:
                 values.setdefault("altitude", place.altitude)
+    elif problem is None and "lon" in values and "lat" in values:
+        if (found_apart := _contradiction(values, point())) is not None:
+            log.warning("%s: %s; the columns count", where, found_apart)
     if problem is None and FIGURE not in values:
         problem = InvalidValue(f"no {FIGURE}", f"give the path of its picture as {FIGURE}")
     return Row(number, where, values, None if problem is None else str(problem))
+
+
+def _contradiction(values: dict[str, Value], place: Point | InvalidValue | None) -> str | None:
+    """Finding about a geometry that was moved while the columns `lon` and `lat` were not, or the reverse."""
+    columns = values["lon"], values["lat"]
+    if not isinstance(place, Point) or not all(isinstance(each, int | float) for each in columns):
+        return None
+    lon, lat = (float(each) for each in columns if isinstance(each, int | float))
+    if abs((lon - place.lon + 180) % 360 - 180) <= MAX_APART_DEG and abs(lat - place.lat) <= MAX_APART_DEG:
+        return None
+    return f"columns lon and lat say {lon:g} {lat:g}, but its geometry is at {place.lon:g} {place.lat:g}"
 
 
 def _with_long(found: Iterable[tuple[str, object]]) -> Iterable[tuple[str, object]]:

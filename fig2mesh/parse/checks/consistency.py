@@ -23,6 +23,9 @@ WORKING_PX: Final = 512
 SLACK: Final = 0.04
 """Distance, share of the silhouette's extent, at which a joint still counts as inside."""
 
+FAR: Final = 0.12
+"""Distance from the silhouette, in diagonals of its box, beyond which a joint is no imprecise one."""
+
 MIN_INSIDE: Final = 0.5
 """Share of the joints inside a given silhouette below which they are refused."""
 
@@ -111,13 +114,16 @@ class ReducedSilhouette(NamedTuple):
 
     def fit(self, points: NDArray[np.floating]) -> JointFit:
         """JointFit of (N, 2) joints, px of the window."""
+        extent = float(np.linalg.norm(np.ptp(points, axis=0))) / max(self.extent, 1e-9)
+        return JointFit(float((self.distances(points) <= SLACK * self.extent).mean()), extent)
+
+    def distances(self, points: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Distances (N,) of (N, 2) points to the silhouette, px of the window; 0 in it."""
         cells = np.asarray(points, np.float64) / self.step
         limit = np.array(self.away.shape[::-1], np.float64) - 1
         near = np.clip(cells, 0, limit)
         beyond = np.linalg.norm(cells - np.clip(cells, -1, limit + 2), axis=1) * self.step
-        away = self.away[near[:, 1].astype(int), near[:, 0].astype(int)] + beyond
-        extent = float(np.linalg.norm(np.ptp(points, axis=0))) / max(self.extent, 1e-9)
-        return JointFit(float((away <= SLACK * self.extent).mean()), extent)
+        return np.asarray(self.away[near[:, 1].astype(int), near[:, 0].astype(int)] + beyond, np.float64)
 
 
 def reduced_silhouette(mask: BoolArray) -> ReducedSilhouette:
@@ -222,6 +228,19 @@ def _moved(points: NDArray[np.floating], silhouette: ReducedSilhouette) -> NDArr
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     shift: NDArray[np.float64] = (silhouette.low + silhouette.high) / 2 - middle
     return shift if silhouette.fit(points + shift).good else None
+
+
+def stray_finding(points: FloatArray, drawn: BoolArray, silhouette: ReducedSilhouette) -> Mismatch | None:
+    """Mismatch of single joints that lie far from the silhouette, which the share of those in it does not show.
+
+    points : (21, 2), px of the window; drawn : (21,) joints that the file has
+    """
+    away = silhouette.distances(points)
+    far = [name for name, index in JOINT.items() if drawn[index] and away[index] > FAR * silhouette.extent]
+    if not far:
+        return None
+    listed = ", ".join(f"{name} ({away[JOINT[name]]:.0f} px)" for name in far)
+    return Mismatch(f"far outside the silhouette: {listed}", "correct or leave out these joints", False)
 
 
 def upright_finding(points: FloatArray, silhouette: ReducedSilhouette) -> Mismatch | None:

@@ -135,3 +135,17 @@ def test_the_folder_to_allow_is_named_and_works(roots: Roots) -> None:
     wider = Path(str(caught.value).rpartition("--root ")[2])
     assert wider == roots.base.parent.resolve()
     assert Roots(roots.base, wider).resolve("figure", secret).samefile(secret)
+
+
+def test_a_table_outside_of_the_root_has_its_own_folder_named(tmp_path: Path) -> None:
+    base, root = tmp_path / "tables", tmp_path / "project"
+    base.mkdir()
+    (root / "pictures").mkdir(parents=True)
+    (root / "pictures" / "a.png").touch()
+    with pytest.raises(
+        InputError, match="b.png does not exist; paths are relative to the folder of the table"
+    ) as caught:
+        Roots(base, root).resolve("figure", Path("pictures/b.png"))
+    assert str(base) in str(caught.value)
+    with pytest.raises(InputError, match="it is in .*project, but paths are relative"):
+        Roots(base, root).resolve("figure", Path("pictures/a.png"))

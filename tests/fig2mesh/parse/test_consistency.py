@@ -200,3 +200,14 @@ def test_missing_joints_are_inferred_and_the_others_kept(tmp_path: Path) -> None
         assert np.linalg.norm(np.subtract(points[name], value[:2])) < 0.06 * 900
     assert figure.score is None
     assert any("l_hip, r_ankle inferred" in doubt for doubt in figure.doubts)
+
+
+@pytest.mark.parametrize("name", ["l_wrist", "r_foot", "head"])
+def test_a_single_joint_far_from_the_figure_is_a_doubt(files: DrawnFiles, name: str) -> None:
+    def stray(points: NDArray[Any]) -> NDArray[Any]:
+        points[JOINT_NAMES.index(name)] = [4, HIGH // 2]
+        return points
+
+    files.keypoints.write_text(json.dumps(keypoints(stray)))
+    (doubt,) = given(files).doubts
+    assert f"far outside the silhouette: {name} (" in doubt

@@ -288,3 +288,25 @@ def test_encodings_and_separators_of_spreadsheets(tmp_path: Path, data: bytes) -
 def test_other_encodings_are_refused_by_line(tmp_path: Path, coding: str) -> None:
     with pytest.raises(InputError, match=r"line 2: byte 0x.. is not UTF-8; save the table as CSV UTF-8"):
         _read(tmp_path, "figure,name\na.png,Müller\n".encode(coding))
+
+
+@pytest.mark.parametrize(
+    ("lon", "lat", "problem"),
+    [
+        (8.5, 47.3, None),
+        (8.5, 47.305, None),  # rounded
+        (368.5 - 360, 47.3, None),
+        (9.9, 40, "columns lon and lat say 9.9 40, but its geometry is at 8.5 47.3"),
+        (47.3, 8.5, "columns lon and lat say 47.3 8.5, but its geometry is at 8.5 47.3"),
+        (8.5, -47.3, "columns lon and lat say 8.5 -47.3, but its geometry is at 8.5 47.3"),
+        (0, 0, "columns lon and lat say 0 0, but its geometry is at 8.5 47.3"),
+    ],
+)
+def test_a_geometry_that_was_moved_without_its_columns(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, lon: float, lat: float, problem: str | None
+) -> None:
+    place = {"type": "Point", "coordinates": [8.5, 47.3]}
+    feature = {"type": "Feature", "geometry": place, "properties": {"figure": "a.png", "lon": lon, "lat": lat}}
+    (row,) = _read(tmp_path, json.dumps({"type": "FeatureCollection", "features": [feature]}), "t.geojson")
+    assert (row.problem, row.values["lon"], row.values["lat"]) == (None, lon, lat)
+    assert (not caplog.text) if problem is None else (f"{problem}; the columns count" in caplog.text)
