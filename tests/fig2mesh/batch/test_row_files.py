@@ -143,9 +143,9 @@ def test_a_table_outside_of_the_root_has_its_own_folder_named(tmp_path: Path) ->
     (root / "pictures").mkdir(parents=True)
     (root / "pictures" / "a.png").touch()
     with pytest.raises(
-        InputError, match="b.png does not exist; paths are relative to the folder of the table"
+        InputError, match=r"b\.png does not exist; paths are relative to the folder of the table"
     ) as caught:
         Roots(base, root).resolve("figure", Path("pictures/b.png"))
     assert str(base) in str(caught.value)
-    with pytest.raises(InputError, match="it is in .*project, but paths are relative"):
+    with pytest.raises(InputError, match=r"it is in .*project, but paths are relative"):
         Roots(base, root).resolve("figure", Path("pictures/a.png"))
