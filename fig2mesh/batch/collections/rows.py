@@ -182,7 +182,7 @@ def make_row(
 
     found : values with the names of their columns, from `column_name`
     problem : found by the reader itself; of several problems the first is reported
-    point : returns the location of its geometry; columns of a place come before it, with a warning where they contradict it
+    point : returns the location of its geometry; columns come before it, with a warning if they differ
     """
     values: dict[str, Value] = {}
     for name, raw in _with_long(found):
@@ -205,9 +205,8 @@ def make_row(
             values.update(lon=place.lon, lat=place.lat)
             if place.altitude is not None:
                 values.setdefault("altitude", place.altitude)
-    elif problem is None and "lon" in values and "lat" in values:
-        if (found_apart := _contradiction(values, point())) is not None:
-            log.warning("%s: %s; the columns count", where, found_apart)
+    elif problem is None and {"lon", "lat"} <= values.keys() and (apart := _contradiction(values, point())):
+        log.warning("%s: %s; the columns count", where, apart)
     if problem is None and FIGURE not in values:
         problem = InvalidValue(f"no {FIGURE}", f"give the path of its picture as {FIGURE}")
     return Row(number, where, values, None if problem is None else str(problem))
