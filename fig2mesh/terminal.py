@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,7 +26,7 @@ def print_outputs(*paths: object) -> None:
     """List files on stdout, one a line, or lines about them, for scripts; nothing with --quiet."""
     if log.isEnabledFor(logging.INFO):
         for path in paths:
-            click.echo(os.fsencode(str(path)))  # names of files may be no UTF-8
+            click.echo(str(path))
 
 
 @contextmanager

@@ -52,11 +52,12 @@ def parameter_of(field: RequestField) -> Callable[[F], F]:
         shown = bool(field.default)
         return click.option(*names, default=field.default, help=facts.help, show_default=shown, is_flag=True)
     required = field.default is dataclasses.MISSING
+    # To click a default of None is a value, and nothing is missing then.
+    default: dict[str, Any] = {"required": True} if required else {"default": field.default}
     return click.option(
         *names,
         type=value_type(field),
-        default=None if required else field.default,
-        required=required,
+        **default,
         nargs=kind.count,
         multiple=kind.many,
         metavar=facts.metavar or None,

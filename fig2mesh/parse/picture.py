@@ -113,6 +113,8 @@ def _reading(path: Path, what: str) -> Iterator[None]:
 
 def _checked_header(path: Path, what: str) -> PictureHeader:
     """Header of a picture small enough to be decoded whole."""
+    if path.is_dir():
+        raise FigureError(path, "is a folder", f"give the picture in it as {what}")
     if path.exists() and not path.is_file():  # reading a pipe would block, and a device never ends
         raise FigureError(path, "cannot be read (not a regular file)", f"give a PNG, JPEG, TIFF or WebP as {what}")
     header = read_header(path)

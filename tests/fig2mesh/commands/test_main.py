@@ -109,6 +109,8 @@ UNKNOWN = {
         "Option '--overlay' requires 5 arguments, IMAGE W S E N; see fig2mesh globe --help",
     ),
     "an argument of a command missing": (["render"], "Missing argument 'FIGURE'; see fig2mesh render --help"),
+    "a required option missing": (["render", "a.png"], "Missing option '-o' / '--output'; see fig2mesh render --help"),
+    "a folder as figure": (["."], ".: is a folder; give the picture in it as figure"),
     "an option of another command": (
         ["inspect", "a.glb", "--lods", "3"],
         "No such option '--lods'; see fig2mesh inspect --help",
