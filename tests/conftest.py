@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import os
 import secrets
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -43,12 +42,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 @pytest.fixture(autouse=True)
-def _untouched_log() -> Iterator[None]:
-    """Undo what a command does to the log, so that the next test finds messages where pytest looks for them."""
+def _untouched_log() -> None:
+    """Undo what the commands of earlier tests and fixtures did to the log: pytest looks for messages at its root."""
     log = logging.getLogger("fig2mesh")
-    before = log.handlers[:], log.level, log.propagate
-    yield
-    log.handlers[:], log.level, log.propagate = before
+    log.handlers.clear()
+    log.setLevel(logging.NOTSET)
+    log.propagate = True
 
 
 @pytest.fixture(scope="session")

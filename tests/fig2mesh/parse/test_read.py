@@ -110,7 +110,7 @@ CASES = {
     "no figure": "no such file",
     "text": "not a picture",
     "truncated": "cannot be read",
-    "folder": "cannot be read",
+    "folder": "is a folder; give the picture in it",
     "blank": "no figure found; pass --bbox",
     "mask size": "50×50 px, but the figure has 400×600",
     "empty mask": "silhouette is empty",
