@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exporters.level_error import level_errors
 from exporters.tiles.tileset import write_tileset
 from georef.geodesy import ecef_from_geodetic
 from tests import py3dtiles
@@ -20,7 +21,7 @@ def test_levels_triangles_volumes_and_place(tmp_path: Path) -> None:
     found = py3dtiles.read("py3dtiles_levels.py", tmp_path / "tileset.json")
     assert [tile["uri"] for tile in found] == ["farmer_lod2.glb", "farmer_lod1.glb", "farmer.glb"]
     assert [tile["triangles"] for tile in found] == [len(mesh.faces) for mesh in reversed(figure.lods)]
-    errors = [*(mesh.deviation_m[1] for mesh in reversed(figure.lods[1:])), 0.0]
+    errors = [*reversed(level_errors(figure.lods))]
     assert [tile["geometric_error"] for tile in found] == pytest.approx(errors)
     feet = ecef_from_geodetic((ZURICH.lon_deg, ZURICH.lat_deg, ZURICH.height_m))
     for tile in found:

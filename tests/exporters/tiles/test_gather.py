@@ -266,7 +266,7 @@ def test_the_command(tmp_path: Path, folder: Path, capsys: pytest.CaptureFixture
     out = tmp_path / "out"
     assert main(["tileset", str(folder), "-o", str(out), "--tiles-version", "1.0", "--visible-from", "500"]) == 0
     captured = capsys.readouterr()
-    assert captured.out == ""
+    assert captured.out == f"{out / 'tileset.json'}\n"
     assert "6 figures" in captured.err
     assert validate(out, external=False) == []
     assert main(["validate", str(out)]) == 0

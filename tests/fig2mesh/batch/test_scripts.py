@@ -31,7 +31,8 @@ def test_a_script_without_a_guard_and_without_semaphores(tmp_path: Path) -> None
     done = subprocess.run(
         [sys.executable, "script.py"], capture_output=True, text=True, check=True, env=environment, cwd=tmp_path
     )
-    assert done.stdout.split() == ["once", "0", "0"]
+    tileset = str(tmp_path / "out" / "tileset.json")
+    assert done.stdout.split() == ["once", tileset, "0", tileset, "0"]
     first, second = done.stderr.splitlines()
     assert "2 converted, 0 unchanged, 0 failed; 2 on the globe" in first
     assert "0 converted, 2 unchanged, 0 failed; 2 on the globe" in second
