@@ -27,6 +27,7 @@ from fig2mesh.batch.collections.rows import (
     unnamed_value,
 )
 from fig2mesh.batch.collections.values import InvalidValue, shown
+from fig2mesh.conversion.cells import ABSENT
 from fig2mesh.errors import InputError
 
 SEPARATORS = ",;\t"
@@ -148,7 +149,9 @@ def csv_rows(path: Path) -> Iterator[Row]:
                 problem = _misfit(names, cells)
             number += 1
             # Cells of a row that does not fit its headings may be those of other columns.
-            found = [(name, cell) for name, cell in zip(names, cells, strict=False) if name] if problem is None else []
+            given = zip(names, cells, strict=False) if problem is None else ()
+            # Only here: GeoJSON and GeoPackage have a null, and keep such texts.
+            found = [(name, None if cell.strip() in ABSENT else cell) for name, cell in given if name]
             yield make_row(number, f"line {first}", found, problem)
 
 

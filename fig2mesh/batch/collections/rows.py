@@ -2,8 +2,8 @@
 
 Names of columns are lower case and stripped, and `-` counts as `_`: `height-m` and `Height_M` are one name.
 Synonyms of `lon` and `lat` are those of `SYNONYMS`; `x` and `y` are pixels, never degrees. Texts are stripped; empty
-ones count as absent, and so do `nan`, `NULL` and the like, see `fig2mesh.conversion.cells.ABSENT`. `lon`, `lat`, `x`
-and `y` are numbers in every kind of file. A column of WKT is the place of a row that has no other.
+ones count as absent, and in CSV so do `nan`, `NULL` and the like, see `fig2mesh.conversion.cells.ABSENT`. `lon`, `lat`,
+`x` and `y` are numbers in every kind of file. A column of WKT is the place of a row that has no other.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import TypeAlias
 from exporters.text import LONE_SURROGATE
 from fig2mesh.batch.collections.values import InvalidValue, Point, shown
 from fig2mesh.batch.collections.wkt import WKT_COLUMNS, is_geometry, wkt_point
-from fig2mesh.conversion.cells import ABSENT, NotNumber, number_of
+from fig2mesh.conversion.cells import NotNumber, number_of
 from fig2mesh.errors import InputError
 
 Value: TypeAlias = "str | int | float | bool | tuple[Value, ...]"
@@ -123,8 +123,6 @@ def fit_text(text: str) -> str | InvalidValue | None:
     if len(text) > MAX_TEXT:
         return InvalidValue(f"more than {MAX_TEXT:,} characters", "give a shorter text")
     text = text.strip()
-    if text in ABSENT:
-        return None
     if not text.isascii() and LONE_SURROGATE.search(text):
         return InvalidValue("bytes that are not UTF-8", "save the text as UTF-8")
     if "\0" in text:
