@@ -16,6 +16,7 @@ from fig2mesh.errors import FigureError
 from fig2mesh.parse.checks.consistency import (
     Mismatch,
     PictureFrame,
+    ReducedSilhouette,
     coordinate_finding,
     joint_finding,
     reduced_silhouette,
@@ -150,7 +151,9 @@ def read_parsed(
             beside = missed_things(on_white(view.rgba), silhouette, view.corner)
             doubts += _logged(path, (*beside, *detached_pieces(silhouette, view.corner)))
             if keypoints is not None:
-                doubts += _settled(keypoints, _joint_findings(joints, silhouette, view, inferred=True))
+                doubts += _settled(
+                    keypoints, _joint_findings(joints, reduced_silhouette(silhouette), view, inferred=True)
+                )
         if part_labels is None:
             parts = found.part_labels
     figure = Figure(
@@ -190,13 +193,12 @@ def read_given(
         doubts += _logged(keypoints, _notes(joints, path))
         _check_inside(keypoints, joints, view, float(max(shape)), FEW)
     outline = None if silhouette is None else reduced_silhouette(silhouette)
-    judged = outline is not None and not outline.small
-    if joints is not None and keypoints is not None and (judged or outline is None):
+    if joints is not None and keypoints is not None and (outline is None or not outline.small):
         _check_coordinates(keypoints, joints, view)
     if silhouette is not None:
         doubts += _settled(where, _silhouette_findings(silhouette, view, mask is not None))
-        if joints is not None and keypoints is not None and judged:
-            doubts += _settled(keypoints, _joint_findings(joints, silhouette, view))
+        if joints is not None and keypoints is not None and outline is not None and not outline.small:
+            doubts += _settled(keypoints, _joint_findings(joints, outline, view))
         if part_labels is not None:
             points = None if joints is None else joints.points_px
             doubts += _settled(part_labels, [label_finding(known, silhouette, points)])
@@ -261,9 +263,8 @@ def _frame(view: PictureView) -> PictureFrame:
 
 
 def _joint_findings(
-    joints: Joints, silhouette: BoolArray, view: PictureView, inferred: bool = False
+    joints: Joints, outline: ReducedSilhouette, view: PictureView, inferred: bool = False
 ) -> Iterator[Mismatch | None]:
-    outline = reduced_silhouette(silhouette)
     whole = joint_finding(joints.points_px[joints.drawn], outline, _frame(view), inferred)
     yield whole
     if whole is None and not inferred:
